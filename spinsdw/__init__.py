@@ -1,0 +1,1 @@
+"""Spin scale-discretised wavelets on the sphere."""
