@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -51,3 +52,9 @@ def test_version_is_the_one_installed():
 def test_unknown_name_is_refused_by_name():
     with pytest.raises(AttributeError, match="has no attribute 'Wavelet'; dir"):
         _ = spinsdw.Wavelet
+
+
+def test_every_folder_of_modules_is_a_package():
+    """Folders without __init__.py would be left out of what is installed."""
+    folders = {path.parent for path in Path(spinsdw.__file__).parent.rglob("*.py")}
+    assert all((folder / "__init__.py").is_file() for folder in folders)

@@ -15,9 +15,13 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "spinsdw"
 
 LAYERS = (  # bottom to top
-    {"errors"},
     {"compiled"},
+    {"errors"},
+    {"files"},
+    {"datasets"},
     {"fourier"},
+    {"parallel"},
+    {"ring_engine"},
     {"harmonics"},
     {"sampling"},
     {"tiling"},

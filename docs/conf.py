@@ -1,0 +1,42 @@
+from importlib.metadata import metadata
+
+_facts = metadata("spinsdw")
+project = _facts["Name"]
+author = _facts["Author"]
+release = version = _facts["Version"]
+project_copyright = f"2026, {author}"
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"]
+templates_path = ["_templates"]
+default_role = "py:obj"
+
+# Equations are numbered by page: (1.3) is the third of the first numbered page.
+numfig = True
+numfig_secnum_depth = 1
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings say types, shapes and units
+numpydoc_show_class_members = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = project
+html_show_sourcelink = False
+html_theme_options = {"navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../tutorials",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",  # every tutorial runs
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "remove_config_comments": True,
+}
