@@ -1,0 +1,145 @@
+"""The Wigner functions d^l_mn(theta) upwards in degree l at fixed m >= 0 and n.
+
+With w_l = sqrt((l^2 - m^2)(l^2 - n^2)) / l the three-term recursion in l reads
+
+    w_{l+1} d^{l+1} = (2l + 1) (cos(theta) - m n / (l (l + 1))) d^l - w_l d^{l-1}.
+
+Written for u_l = d^l / scale_l with scale_{l+1} = scale_{l-1} w_l / w_{l+1} it becomes
+
+    u_{l+1} = (a_l cos(theta) + b_l) u_l - u_{l-1},
+
+two multiply-adds a step; the scale is absorbed by the coefficients that multiply d. It starts from
+
+    d^M_mn = +-sqrt(binom(2M, M+K) / 4^M) sin(theta)^(M-|K|) (1 +- cos(theta))^|K|,
+
+M = max(m, |n|), K the other order. Near a pole the start underflows for large m, so a ring carries
+``scale``: its true values are u * 2**(800 scale) with scale = 0 (in range) or below.
+"""
+
+from __future__ import annotations
+
+import math
+
+from spinsdw.compiled.jit import kernel
+
+__all__ = [
+    "PADDING",
+    "fill_powers",
+    "fill_recursion",
+    "fill_start",
+    "multiply_powers",
+    "rescale",
+    "start_norm",
+]
+
+# Degrees advanced between two looks at the exponents; arrays over degree are padded by as much.
+PADDING = 16
+# A ring whose values are below 2**-160 is "out of range": 16 steps grow it by less than 2**90.
+_STEP = 800
+_FLOOR = -160
+_SHRINK = 2.0**-_STEP
+_LIMIT = 2.0 ** (_STEP + _FLOOR)
+_RENORM = 2.0**256
+_UNRENORM = 2.0**-256
+
+
+@kernel
+def fill_recursion(m, n, L, root, a, b, scale):
+    """Fill a_l, b_l, scale_l for l = max(m, |n|) .. L - 1; root[k] = sqrt(k), k < 2 L."""
+    n_abs = abs(n)
+    first = max(m, n_abs)
+    scale[first] = 1.0
+    w, before, mn = 1.0, 1.0, float(m) * float(n)
+    for el in range(first, L):
+        # The product under the root of w_{l+1}, each factor exact to rounding.
+        w_next = (
+            root[el + 1 - m] * root[el + 1 + m] * root[el + 1 - n_abs] * root[el + 1 + n_abs]
+        ) / (el + 1.0)
+        now = scale[el]
+        following = 1.0 if el == first else before * w / w_next
+        a[el] = (2 * el + 1) * now / (w_next * following)
+        b[el] = -a[el] * mn / (el * (el + 1.0)) if el > 0 else 0.0
+        scale[el + 1] = following
+        before, w = now, w_next
+
+
+@kernel
+def fill_powers(base, exponent, mantissa, power):
+    """Fill mantissa * 2**power = base**exponent, element by element; base in [0, 2]."""
+    for r in range(base.size):
+        mantissa[r] = 1.0
+        power[r] = 0.0
+        square, square_power = base[r], 0.0
+        k = exponent
+        while k > 0:
+            if k & 1:
+                mantissa[r] *= square
+                power[r] += square_power
+                if mantissa[r] < _UNRENORM:
+                    mantissa[r] *= _RENORM
+                    power[r] -= 256.0
+            square *= square
+            square_power *= 2.0
+            if square < _UNRENORM:
+                square *= _RENORM
+                square_power -= 256.0
+            elif square > _RENORM:
+                square *= _UNRENORM
+                square_power += 256.0
+            k >>= 1
+
+
+@kernel
+def multiply_powers(base, mantissa, power):
+    """Raise the exponent of `fill_powers` by one."""
+    for r in range(base.size):
+        value = mantissa[r] * base[r]
+        small = value < _UNRENORM
+        mantissa[r] = value * (_RENORM if small else 1.0)
+        power[r] -= 256.0 if small else 0.0
+
+
+@kernel
+def start_norm(M, K, central):
+    """Return (v, e): v 2**e = sqrt(binom(2M, M + K) / 4**M), central[M] = binom(2M, M) / 4**M."""
+    value, power = central[M], 0.0
+    for i in range(1, abs(K) + 1):
+        value *= (M - i + 1.0) / (M + i)
+        if value < 2.0**-512:
+            value *= 2.0**512
+            power -= 256.0
+    return math.sqrt(value), power
+
+
+@kernel
+def fill_start(norm, norm_power, sines, sine_powers, ones, one_powers, before, now, scale):
+    """Set u_{l0-1} = 0, u_{l0} and the exponents of a block of rings."""
+    for r in range(now.size):
+        before[r] = 0.0
+        scale[r] = 0.0
+        value = norm * sines[r] * ones[r]
+        if value == 0.0:
+            # A pole, where d^l0 is exactly zero: so is every later degree.
+            now[r] = 0.0
+        else:
+            mantissa, exponent = math.frexp(value)
+            exponent += int(norm_power + sine_powers[r] + one_powers[r])
+            if exponent < _FLOOR:
+                step = math.floor((exponent - _FLOOR) / _STEP)
+                scale[r] = step
+                exponent -= _STEP * int(step)
+            now[r] = math.ldexp(mantissa, exponent)
+
+
+@kernel
+def rescale(before, now, scale):
+    """Bring rings that have grown back into range; return how many are in range."""
+    inside = 0
+    for r in range(now.size):
+        grown = scale[r] < 0.0 and max(abs(before[r]), abs(now[r])) > _LIMIT
+        factor = _SHRINK if grown else 1.0
+        before[r] *= factor
+        now[r] *= factor
+        scale[r] += 1.0 if grown else 0.0
+        inside += 1 if scale[r] == 0.0 else 0
+    return inside

@@ -1,0 +1,184 @@
+"""`RingEngine`: Wigner sums over degree for a set of rings, and their adjoint.
+
+The compiled kernels need the rings' geometry padded to whole vector blocks, tables of square roots
+and binomials, and for each m the range of rings where d^l_mn is not negligible. This object holds
+them for one bandlimit and one set of colatitudes, and shares the work among threads.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spinsdw.parallel import run_tasks
+
+__all__ = ["RingEngine", "make_runs"]
+
+Array = np.ndarray[Any, Any]
+
+# exp(-45) = 2**-65: d^l_mn below it adds nothing to a sum in double precision.
+_NEGLIGIBLE = 45.0
+
+
+def make_runs(orders: tuple[int, ...], *, symmetric: bool = False, sides: int = 2) -> Array:
+    """List the passes of the recursion that serve every series F_n(+-m), n in ``orders``.
+
+    Each row is n, then (i, sigma, mirrored) for up to two series, as `compiled.order_sums` reads
+    them. ``symmetric`` grids compute the northern rings and mirror them.
+    """
+    place = {n: i for i, n in enumerate(orders)}
+    none = (-1, 1, 0)
+    rows: list[tuple[int, ...]] = []
+    if symmetric:
+        for n, i in place.items():
+            if n == 0 and sides == 1:
+                rows.append((0, i, 1, 0, i, 1, 1))
+            else:
+                rows.append((n, i, 1, 0, i, -1, 1))
+                rows.append((-n, i, 1, 1, i, -1, 0))
+    else:
+        for size in sorted({abs(n) for n in orders}):
+            for n in (size, -size) if size else (0,):
+                plus = (place[n], 1, 0) if n in place else none
+                minus = (place[-n], -1, 0) if -n in place else none
+                if plus[0] >= 0 or minus[0] >= 0:
+                    rows.append((n, *plus, *minus))
+    return np.array(rows, dtype=np.int64)
+
+
+def _barrier(m: Array, bandlimit: int, sine: Array) -> Array:
+    """Return the exponent of decay of d^l_m0, l = bandlimit, behind its turning point sin = m/l.
+
+    It is the integral of sqrt(m^2 / sin^2 - l^2) over theta (WKB), zero in the classical region.
+    """
+    degree = float(bandlimit)
+    cosine = np.sqrt(1 - sine**2)
+    q = np.sqrt(np.maximum(m**2 - (degree * sine) ** 2, 0.0))
+    k = np.sqrt(np.maximum(degree**2 - m**2, 1e-30))
+    ratio = np.minimum(q / np.maximum(m * cosine, 1e-300), 1 - 1e-16)
+    exponent = m * np.arctanh(ratio) - degree * np.log(np.maximum(degree * cosine + q, 1e-300) / k)
+    return np.where(q > 0, exponent, 0.0)
+
+
+def _largest_order(sine: Array, bandlimit: int) -> Array:
+    """Return for each ring the largest m at which d^l_m0, l < bandlimit, is not negligible."""
+    low, high = np.minimum(bandlimit * sine, bandlimit - 1.0), np.full(sine.shape, float(bandlimit))
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        beyond = _barrier(middle, bandlimit, sine) > _NEGLIGIBLE
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.ceil(high).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class RingEngine:
+    """Sums over d^l_mn(theta) at fixed colatitudes.
+
+    Parameters
+    ----------
+    bandlimit : int
+        Degrees are below it.
+    colatitudes : ndarray, shape (rings,)
+        Increasing, in [0, pi]; of a symmetric grid the northern rings and the equator.
+    symmetric : bool
+        Whether the rings pi - theta belong to the grid too.
+    """
+
+    bandlimit: int
+    colatitudes: Array
+    symmetric: bool = False
+
+    @functools.cached_property
+    def _tables(self) -> tuple[Array, Array]:
+        root = np.sqrt(np.arange(2 * self.bandlimit + 2, dtype=float))
+        # binom(2M, M) / 4**M, up to M = L for the orders above m.
+        index = np.arange(1, self.bandlimit + 1, dtype=float)
+        central = np.concatenate([[1.0], np.cumprod((2 * index - 1) / (2 * index))])
+        return root, central
+
+    def _padded_rings(self, padding: int) -> tuple[Array, ...]:
+        half = self.colatitudes / 2
+        sine = np.sin(self.colatitudes)
+        plus, minus = 2 * np.cos(half) ** 2, 2 * np.sin(half) ** 2
+        # sin(pi) is not zero in floats, but a pole must be one: d^l_mn vanishes there exactly.
+        pole = sine < 4e-16
+        sine[pole] = 0.0
+        plus[pole & (minus > 1)], minus[pole & (minus < 1)] = 0.0, 0.0
+        columns = ((sine, 1.0), (plus, 1.0), (minus, 1.0), (-minus, -1.0))
+        return tuple(np.concatenate([v, np.full(padding, fill)]) for v, fill in columns)
+
+    @functools.cached_property
+    def _rings(self) -> dict[str, tuple[Array, ...]]:
+        from spinsdw.compiled.vectors import ADJOINT_RINGS, RINGS
+
+        return {"sum": self._padded_rings(RINGS), "adjoint": self._padded_rings(ADJOINT_RINGS)}
+
+    @functools.lru_cache(maxsize=32)  # noqa: B019 - engines are few and shared
+    def _windows(self, largest_order: int) -> Array:
+        """For each m the first and one past the last ring that matter at |n| <= largest_order."""
+        sine = self._rings["sum"][0][: self.colatitudes.size]
+        reach = _largest_order(sine, self.bandlimit) + largest_order
+        m = np.arange(self.bandlimit)
+        north = np.maximum.accumulate(reach)
+        south = np.maximum.accumulate(reach[::-1])
+        low = np.searchsorted(north, m)
+        high = sine.size - np.searchsorted(south, m)
+        return np.stack([np.minimum(low, sine.size), np.maximum(high, 0)]).astype(np.int64)
+
+    def _ranges(self, threads: int) -> list[tuple[int, int]]:
+        from spinsdw.compiled.order_sums import M_CHUNK
+
+        step = self.bandlimit if threads == 1 else M_CHUNK
+        return [(m, min(m + step, self.bandlimit)) for m in range(0, self.bandlimit, step)]
+
+    def fill_spectra(
+        self,
+        flm: Array,
+        weights: Array,
+        *,
+        orders: tuple[int, ...],
+        mixing: Array,
+        lowest: int,
+        sides: int = 2,
+        out: Array,
+        threads: int,
+    ) -> None:
+        """Fill ``out[k, ring, m]``; shapes as in `compiled.order_sums.fill_ring_spectra`."""
+        from spinsdw.compiled.order_sums import fill_ring_spectra
+
+        runs = make_runs(orders, symmetric=self.symmetric, sides=sides)
+        windows = self._windows(max(abs(n) for n in orders))
+        rings, tables = self._rings["sum"], self._tables
+        arguments = (self.bandlimit, lowest, sides, flm, weights, runs, mixing, rings, windows, tables)
+        tasks = [
+            functools.partial(fill_ring_spectra, first, stop, *arguments, out)
+            for first, stop in self._ranges(threads)
+        ]
+        run_tasks(tasks, threads)
+
+    def add_to_harmonics(
+        self,
+        spectra: Array,
+        weights: Array,
+        *,
+        orders: tuple[int, ...],
+        lowest: int,
+        sides: int = 2,
+        out: Array,
+        threads: int,
+    ) -> None:
+        """Add to ``out``; shapes as in `compiled.order_sums.add_spectra_to_harmonics`."""
+        from spinsdw.compiled.order_sums import add_spectra_to_harmonics
+
+        runs = make_runs(orders, symmetric=self.symmetric, sides=sides)
+        windows = self._windows(max(abs(n) for n in orders))
+        rings, tables = self._rings["adjoint"], self._tables
+        arguments = (self.bandlimit, lowest, sides, spectra, weights, runs, rings, windows, tables, out)
+        tasks = [
+            functools.partial(add_spectra_to_harmonics, first, stop, *arguments)
+            for first, stop in self._ranges(threads)
+        ]
+        run_tasks(tasks, threads)

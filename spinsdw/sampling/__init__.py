@@ -1,0 +1,9 @@
+"""Where the points of a map are: the samplings of the sphere."""
+
+from __future__ import annotations
+
+from spinsdw.sampling.base import Sampling, resolve_sampling
+from spinsdw.sampling.equiangular import MW, MWSS
+from spinsdw.sampling.healpix_rings import HealpixRings
+
+__all__ = ["MW", "MWSS", "HealpixRings", "Sampling", "resolve_sampling"]

@@ -1,0 +1,177 @@
+"""The McEwen-Wiaux samplings: equally spaced in theta, exact with the fewest rings.
+
+The integral over the sphere of F_m(theta) d^l_mn(theta) is half the integral over the full circle
+of F d |sin|, both extended to negative theta by the parity (-1)^(m + n). There F and d are
+trigonometric polynomials of degree below L, so only the part of F |sin| below L counts, call it H,
+and H d, of degree at most 2 L - 2, is integrated exactly by the grid's own C = 2 L - 1 (MW) or 2 L
+(MWSS) points. With S the shift by half a step (exact for F), w the series of |sin| up to degree
+2 L - 2, and A, B the grid's points and those half-way between,
+
+    H = (w_A F + S^T w_B S F) / 2,
+
+because the 2 C points together resolve the product. Hence no second grid and no second sum over l.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from spinsdw.fourier import from_series, to_series
+from spinsdw.parallel import run_tasks
+from spinsdw.sampling.base import Sampling
+
+__all__ = ["MW", "MWSS"]
+
+Array = np.ndarray[Any, Any]
+
+# Complex numbers of one batch of circles: 4 such batches stay in a core's cache.
+_BATCH_SIZE = 2**14
+
+
+def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array]:
+    """|sin(theta)| up to degree 2 L - 2, at theta = first + 2 pi t / size and half a step on."""
+    degree = np.fft.fftfreq(2 * size, 1 / (2 * size))
+    even = (degree % 2 == 0) & (np.abs(degree) <= 2 * bandlimit - 2)
+    series = np.where(even, 2 / (np.pi * (1 - np.where(even, degree, 0.0) ** 2)), 0.0)
+    values = np.fft.ifft(series * np.exp(1j * degree * first)).real * (2 * size)
+    return np.ascontiguousarray(values[::2]), np.ascontiguousarray(values[1::2])
+
+
+def _shift_phases(size: int) -> Array:
+    """Factors exp(i k pi / size) of a shift by half a step; the Nyquist term carries nothing."""
+    k = np.fft.fftfreq(size, 1 / size)
+    phases = np.exp(1j * np.pi * k / size)
+    if size % 2 == 0:
+        phases[size // 2] = 0.0
+    return phases
+
+
+@dataclass(frozen=True)
+class _Equiangular(Sampling):
+    """What MW and MWSS share: C points on the full circle in theta."""
+
+    # Ring t mirrors to C - _offset - t modulo C.
+    _offset: ClassVar[int]
+
+    @property
+    def n_phi(self) -> int:
+        return 2 * self.bandlimit - self._offset
+
+    @functools.cached_property
+    def _weights(self) -> tuple[Array, Array, Array]:
+        size = self.n_phi
+        here, between = _sine_weights(self.bandlimit, size, float(self.colatitudes[0]))
+        # 2 pi / P of the ring sums, pi / C of the circle, 1 / 2 of the two grids.
+        factor = np.pi**2 / size**2
+        # 1 / size**2: the two inverse transforms are not normalised.
+        return here * factor, between * factor / size**2, _shift_phases(size)
+
+    def _project(self, circles: Array) -> None:
+        """circles <- (w_A + S^T w_B S) circles, times the constants."""
+        here, between, phases = self._weights
+        work, shifted = np.empty_like(circles), np.empty_like(circles)
+        to_series(circles, work)
+        work *= phases
+        from_series(work, shifted)
+        shifted *= between
+        to_series(shifted, work)
+        work *= phases.conj()
+        from_series(work, shifted)
+        circles *= here
+        circles += shifted
+
+    def _weigh_batch(self, columns: Array, even: Array, odd: Array, parity: float) -> None:
+        from spinsdw.compiled.columns import fill_circles, fill_folded
+
+        pairs = max(even.size, odd.size)
+        values = np.zeros((2, pairs, self.n_rings), dtype=np.complex128)
+        values[0, : even.size], values[1, : odd.size] = columns[even], columns[odd]
+        circles = np.empty((pairs, self.n_phi), dtype=np.complex128)
+        fill_circles(values[0], values[1], parity, self._offset, circles)
+        self._project(circles)
+        fill_folded(circles, parity, self._offset, values[0], values[1])
+        columns[even], columns[odd] = values[0, : even.size], values[1, : odd.size]
+
+    def weigh_columns(self, columns: Array, orders: tuple[int, ...], *, threads: int) -> None:
+        n_m = columns.shape[1]
+        m = np.arange(n_m)
+        if n_m == self.n_phi:
+            m = np.where(m < self.bandlimit, m, m - n_m)
+        even, odd = np.flatnonzero(m % 2 == 0), np.flatnonzero(m % 2 != 0)
+        step = max(1, _BATCH_SIZE // self.n_phi)
+        tasks = [
+            functools.partial(
+                self._weigh_batch,
+                columns[i],
+                even[j : j + step],
+                odd[j : j + step],
+                -1.0 if n % 2 else 1.0,
+            )
+            for i, n in enumerate(orders)
+            for j in range(0, max(even.size, odd.size), step)
+        ]
+        run_tasks(tasks, threads)
+
+
+@dataclass(frozen=True)
+class MW(_Equiangular):
+    """McEwen-Wiaux sampling: theta_t = (2 t + 1) pi / (2 L - 1), t < L; 2 L - 1 points a ring.
+
+    The last ring is the south pole. McEwen & Wiaux 2011, arXiv:1110.6298.
+
+    Parameters
+    ----------
+    bandlimit : int
+        Signals have degrees l < bandlimit.
+
+    Examples
+    --------
+    >>> MW(3).shape
+    (3, 5)
+    >>> bool(MW(3).colatitudes[-1] == np.pi)
+    True
+    """
+
+    name: ClassVar[str] = "mw"
+    _offset: ClassVar[int] = 1
+
+    @property
+    def n_rings(self) -> int:
+        return self.bandlimit
+
+    @property
+    def colatitudes(self) -> Array:
+        return (2 * np.arange(self.bandlimit) + 1) * np.pi / (2 * self.bandlimit - 1)
+
+
+@dataclass(frozen=True)
+class MWSS(_Equiangular):
+    """Symmetric McEwen-Wiaux sampling: theta_t = pi t / L, t <= L; 2 L points a ring.
+
+    Both poles are rings. Ducasse, McEwen & Wiaux; the layout of the s2fft and ssht packages.
+
+    Parameters
+    ----------
+    bandlimit : int
+        Signals have degrees l < bandlimit.
+
+    Examples
+    --------
+    >>> MWSS(3).shape
+    (4, 6)
+    """
+
+    name: ClassVar[str] = "mwss"
+    _offset: ClassVar[int] = 0
+
+    @property
+    def n_rings(self) -> int:
+        return self.bandlimit + 1
+
+    @property
+    def colatitudes(self) -> Array:
+        return np.pi * np.arange(self.bandlimit + 1) / self.bandlimit

@@ -1,0 +1,53 @@
+"""Checks of what users hand over: spins and maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from spinsdw.errors import DataError, ParameterError, ShapeError
+
+__all__ = ["check_finite", "check_map", "check_spin"]
+
+Array = np.ndarray[Any, Any]
+
+
+def check_spin(spin: object, bandlimit: int) -> int:
+    """Return the spin as an int; a signal of bandlimit L has |spin| < L."""
+    if isinstance(spin, bool) or not isinstance(spin, int | np.integer):
+        msg = f"spin={spin!r} must be an integer."
+        raise ParameterError(msg)
+    if abs(int(spin)) >= bandlimit:
+        msg = (
+            f"spin={spin} must be smaller in size than bandlimit={bandlimit}; "
+            "no degree below the bandlimit carries it."
+        )
+        raise ParameterError(msg)
+    return int(spin)
+
+
+def check_finite(values: Array, name: str) -> None:
+    """Raise `DataError` if an array holds NaN or infinity."""
+    bad = values.size - int(np.count_nonzero(np.isfinite(values)))
+    if bad:
+        msg = f"{name} has {bad} values that are not finite; mask or replace them first."
+        raise DataError(msg)
+
+
+def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "map") -> Array:
+    """Return maps as a native C-ordered float64 (``real``) or complex128 array, checked."""
+    values = np.asarray(maps)
+    if values.dtype.kind not in "biufc":
+        msg = f"{name} has dtype {values.dtype}; it must hold real or complex numbers."
+        raise DataError(msg)
+    if values.shape[-len(shape) :] != shape:
+        expected = ", ".join(str(n) for n in shape)
+        msg = f"{name} has shape {values.shape}; it must be (..., {expected}) for this transform."
+        raise ShapeError(msg)
+    if real and values.dtype.kind == "c":
+        msg = f"{name} is complex but real=True was asked for; pass its real part or use real=False."
+        raise DataError(msg)
+    values = np.ascontiguousarray(values, dtype=np.float64 if real else np.complex128)
+    check_finite(values, name)
+    return values
