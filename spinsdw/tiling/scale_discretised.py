@@ -9,7 +9,7 @@ from functools import cached_property
 from spinsdw.errors import ParameterError
 from spinsdw.tiling import s2let
 from spinsdw.tiling.base import FloatArray
-from spinsdw.tiling.dilated import DilatedTiling
+from spinsdw.tiling.dilated import DilatedTiling, powers_up_to
 from spinsdw.tiling.quadrature import bump_integrals
 
 __all__ = ["ScaleDiscretisedTiling", "scale_discretised_profile"]
@@ -92,7 +92,7 @@ class ScaleDiscretisedTiling(DilatedTiling):
     @cached_property
     def edges(self) -> tuple[Fraction, ...]:
         """``dilation**j`` for every scale j from 0 to the highest, exactly."""
-        exact = super().edges
+        exact = powers_up_to(self.dilation, self.bandlimit - 1)
         if self.quadrature == "exact":
             return exact
         highest = s2let.highest_scale(self.bandlimit, self.dilation)
