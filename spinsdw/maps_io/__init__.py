@@ -1,0 +1,29 @@
+"""Maps and wavelet coefficients in FITS files: the only part of the package that opens them.
+
+`guard` holds a file's promises against its length, `layout` the header of a HEALPix table,
+`reading` and `writing` go between files and arrays in RING order, `coefficients` keeps wavelet
+coefficients.
+"""
+
+from __future__ import annotations
+
+from spinsdw.maps_io.coefficients import read_coefficients, write_coefficients
+from spinsdw.maps_io.reading import (
+    HealpixMap,
+    PolarisationMaps,
+    read_map,
+    read_mask,
+    read_polarisation,
+)
+from spinsdw.maps_io.writing import write_maps
+
+__all__ = [
+    "HealpixMap",
+    "PolarisationMaps",
+    "read_coefficients",
+    "read_map",
+    "read_mask",
+    "read_polarisation",
+    "write_coefficients",
+    "write_maps",
+]
