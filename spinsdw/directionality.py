@@ -82,7 +82,7 @@ class Directionality:
         Row k, column as in ``orders``: it takes coefficients by order to coefficients by
         orientation. Its inverse is its conjugate transpose divided by ``directions``.
         """
-        matrix = np.exp(1j * np.outer(self.orientations, self.orders))
+        matrix: ComplexArray = np.exp(1j * np.outer(self.orientations, self.orders))
         matrix.flags.writeable = False
         return matrix
 

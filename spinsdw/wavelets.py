@@ -1,0 +1,196 @@
+"""Wavelets: a tiling of the degrees, a directionality in azimuth, and a spin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinsdw.directionality import Directionality
+from spinsdw.errors import ParameterError
+from spinsdw.harmonics import check_integer
+from spinsdw.tiling import Tiling
+
+__all__ = ["Wavelets"]
+
+ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wavelets:
+    """The harmonic coefficients of wavelets and scaling function (eq-wavelet).
+
+    Parameters
+    ----------
+    tiling : Tiling
+        How degrees are shared out between the scales; it sets the bandlimit.
+    directionality : Directionality
+        How a wavelet depends on azimuth. It may have more directions than the bandlimit of a
+        small scale, but not more than that of the tiling.
+    spin : int
+        The spin of the signals; below its absolute value all coefficients are zero.
+    original_spin : int
+        r of eq-spin-lowered, keyword only. 0 for none. For r > 0 wavelets and scaling function are
+        multiplied by ``(-1)**r sqrt((l+r)!/(l-r)!)``, and for r < 0 divided by it; they are zero
+        below ``|r|`` as well. What r analyses, -r synthesises: see `dual`.
+
+    Raises
+    ------
+    ParameterError
+        If ``tiling`` or ``directionality`` is of another type, there are more directions than
+        degrees, a spin is not an integer or leaves no degree below the bandlimit, or
+        ``original_spin`` is so large that its factor overflows.
+
+    Examples
+    --------
+    >>> from spinsdw.tiling import ScaleDiscretisedTiling
+    >>> wavelets = Wavelets(ScaleDiscretisedTiling(32), Directionality(3), spin=2)
+    >>> wavelets.wavelet_harmonics(3).shape
+    (3, 16)
+    >>> wavelets.admissibility_error < 1e-14
+    True
+    """
+
+    tiling: Tiling
+    directionality: Directionality
+    spin: int = 0
+    original_spin: int = field(default=0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._check_parts()
+        for name in ("spin", "original_spin"):
+            value = check_integer(getattr(self, name), name)
+            object.__setattr__(self, name, value)
+            if abs(value) >= self.bandlimit:
+                msg = (
+                    f"{name}={value} must be smaller in size than bandlimit={self.bandlimit}, "
+                    "else no degree is left; raise the bandlimit."
+                )
+                raise ParameterError(msg)
+        self._check_factor()
+
+    def _check_parts(self) -> None:
+        if not isinstance(self.tiling, Tiling):
+            msg = f"tiling={self.tiling!r} must be a Tiling; make a ScaleDiscretisedTiling."
+            raise ParameterError(msg)
+        if not isinstance(self.directionality, Directionality):
+            msg = f"directionality={self.directionality!r} must be a Directionality; make one."
+            raise ParameterError(msg)
+        directions = self.directionality.directions
+        if directions > self.bandlimit:
+            msg = (
+                f"directions={directions} must not exceed bandlimit={self.bandlimit}, since no "
+                "degree has that many orders of one parity; lower it."
+            )
+            raise ParameterError(msg)
+
+    def _check_factor(self) -> None:
+        r = abs(self.original_spin)
+        # Of the highest degree, L - 1: the product of L - r, ..., L - 1 + r.
+        digits = np.sum(np.log10(np.arange(self.bandlimit - r, self.bandlimit + r))) / 2
+        if digits > 300:
+            msg = (
+                f"original_spin={self.original_spin} must keep sqrt((l+r)!/(l-r)!) below 1e300 "
+                f"up to bandlimit={self.bandlimit}; lower either."
+            )
+            raise ParameterError(msg)
+
+    @property
+    def bandlimit(self) -> int:
+        """The bandlimit of the tiling."""
+        return self.tiling.bandlimit
+
+    @property
+    def scales(self) -> range:
+        """Every scale of the tiling, from the lowest to the highest."""
+        return self.tiling.scales
+
+    @property
+    def lowest_degree(self) -> int:
+        """The first degree that the wavelets can hold: the larger size of the two spins."""
+        return max(abs(self.spin), abs(self.original_spin))
+
+    @property
+    def dual(self) -> Wavelets:
+        """The wavelets that synthesise what these analyse: ``original_spin`` with its sign turned.
+
+        Without an original spin they are the wavelets themselves.
+        """
+        return replace(self, original_spin=-self.original_spin)
+
+    def _lowering_factor(self, bandlimit: int) -> FloatArray:
+        """Eq-spin-lowered for each degree below ``bandlimit``, zero below both spins."""
+        el, r = np.arange(bandlimit, dtype=np.float64), abs(self.original_spin)
+        factor = np.full(bandlimit, -1.0 if r % 2 else 1.0)
+        factor[: self.lowest_degree] = 0.0
+        held = el[self.lowest_degree :]
+        for k in range(1 - r, r + 1):
+            root = np.sqrt(held + k)
+            factor[self.lowest_degree :] *= root if self.original_spin > 0 else 1 / root
+        return factor
+
+    def wavelet_harmonics(self, scale: int) -> ComplexArray:
+        """Return the coefficients psi_ln of the wavelet of one scale.
+
+        Parameters
+        ----------
+        scale : int
+            One of ``scales``.
+
+        Returns
+        -------
+        ndarray, shape (directions, tiling.scale_bandlimit(scale)), complex128
+            Row as in ``directionality.orders``, column is the degree. Zero below the spins, so a
+            small scale may be zero throughout.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such scale.
+
+        Examples
+        --------
+        >>> from spinsdw.tiling import ScaleDiscretisedTiling
+        >>> wavelets = Wavelets(ScaleDiscretisedTiling(8), Directionality(1))
+        >>> psi = wavelets.wavelet_harmonics(1)
+        >>> float((8 * np.pi**2 / 5 * psi[0, 2] ** 2).real.round(12))
+        1.0
+        """
+        bandlimit = self.tiling.scale_bandlimit(scale)
+        el = np.arange(bandlimit)
+        profile = np.sqrt((2 * el + 1) / (8 * np.pi**2)) * self.tiling.kernel(scale)[:bandlimit]
+        profile = profile * self._lowering_factor(bandlimit)
+        return self.directionality.coefficients(bandlimit) * profile
+
+    @property
+    def scaling_harmonics(self) -> FloatArray:
+        """The coefficients phi_l0 of the scaling function, shape (bandlimit,), float64.
+
+        Indexed by degree, zero below the spins and from ``tiling.scaling_bandlimit`` upwards.
+        """
+        el = np.arange(self.bandlimit)
+        profile = np.sqrt((2 * el + 1) / (4 * np.pi)) * self.tiling.scaling_kernel
+        return np.asarray(profile * self._lowering_factor(self.bandlimit))
+
+    @property
+    def admissibility(self) -> FloatArray:
+        """The sum of eq-admissibility at each degree, shape (bandlimit,), float64.
+
+        1 from ``lowest_degree`` upwards, 0 below: then synthesis by `dual` undoes analysis. With an
+        original spin each square is a product of wavelet and dual.
+        """
+        dual = self.dual
+        el = np.arange(self.bandlimit)
+        total = 4 * np.pi / (2 * el + 1) * self.scaling_harmonics * dual.scaling_harmonics
+        for scale in self.scales:
+            psi, other = self.wavelet_harmonics(scale), dual.wavelet_harmonics(scale)
+            products = np.sum(psi.real * other.real + psi.imag * other.imag, axis=0)
+            total[: products.size] += 8 * np.pi**2 / (2 * el[: products.size] + 1) * products
+        return np.asarray(total)
+
+    @property
+    def admissibility_error(self) -> float:
+        """The largest ``|admissibility - 1|`` from ``lowest_degree`` upwards."""
+        return float(np.max(np.abs(self.admissibility[self.lowest_degree :] - 1)))
