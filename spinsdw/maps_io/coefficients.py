@@ -3,7 +3,7 @@
 ====================  =======================================================================
 unit                  holds
 ====================  =======================================================================
-primary header        PARAMS, the parameters as JSON text
+primary header        PARAMS, the parameters as JSON text; NSCALES, the number of scales
 extension SCALING     the scaling coefficients
 extension SCALE_j     the coefficients of scale j, for every j
 ====================  =======================================================================
@@ -24,7 +24,7 @@ import numpy as np
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import DataError, ParameterError
 from spinsdw.maps_io.guard import GuardedFile, open_guarded, refuse
-from spinsdw.maps_io.writing import provenance, write_hdus
+from spinsdw.maps_io.writing import Cards, provenance, write_hdus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -83,8 +83,11 @@ def write_coefficients(
     arrays = {"SCALING": coefficients.scaling}
     arrays |= {f"SCALE_{j}": coefficients[j] for j in coefficients.scales}
     images = [_image(name, np.asarray(values)) for name, values in arrays.items()]
-    parameters = ("PARAMS", _json(coefficients.parameters), "")
-    return write_hdus(path, images, overwrite=overwrite, cards=[parameters, *provenance()])
+    cards: Cards = [
+        ("NSCALES", len(coefficients.scales), "number of wavelet scales"),
+        ("PARAMS", _json(coefficients.parameters), ""),
+    ]
+    return write_hdus(path, images, overwrite=overwrite, cards=[*cards, *provenance()])
 
 
 def read_coefficients(
@@ -120,14 +123,16 @@ def read_coefficients(
     with open_guarded(path, None) as file:
         parameters = _parameters(file)
         file.check_memory(2 * sum(unit.size for unit in file.units), max_memory)
-        with file.opened() as hdus:
-            arrays = {hdu.name: _array(file, hdu) for hdu in hdus[1:]}
-        if "SCALING" not in arrays or len(arrays) < len(file.units) - 1:
-            found = f"has the extensions {list(arrays)} in {len(file.units) - 1}"
+        with file.opened("ImageHDU") as images:
+            arrays = {image.name: _array(file, image) for image in images}
+        scales = file.keyword("NSCALES", 0)
+        # A file cut between two extensions is still valid FITS: only the count tells.
+        if "SCALING" not in arrays or len(arrays) - 1 != scales:
+            found = f"has the extensions {list(arrays)} where NSCALES = {scales!r}"
             raise refuse(file.path, found, "give a file that write_coefficients wrote")
         scaling = arrays.pop("SCALING")
-        scales = {_scale(file, name): values for name, values in arrays.items()}
-        return WaveletCoefficients(scaling, scales, parameters)
+        wavelets = {_scale(file, name): values for name, values in arrays.items()}
+        return WaveletCoefficients(scaling, wavelets, parameters)
 
 
 def _json(parameters: Mapping[str, Any]) -> str:

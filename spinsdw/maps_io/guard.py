@@ -8,7 +8,6 @@ only then are data touched.  Plain and gzip files are read, no other compression
 from __future__ import annotations
 
 import gzip
-import zlib
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -87,8 +86,8 @@ class GuardedFile:
             raise MemoryBudgetError(msg)
 
     @contextmanager
-    def opened(self) -> Iterator[Any]:
-        """Open the units that were checked as an astropy HDUList."""
+    def opened(self, kind: str, first: int = 1) -> Iterator[list[Any]]:
+        """Open the units from ``first`` to the last checked as astropy HDUs of one class."""
         from astropy.io import fits
 
         self.stream.seek(0)
@@ -99,7 +98,12 @@ class GuardedFile:
                 raise _truncated(self.path, self.units[-1].end, len(expanded))
             source = BytesIO(expanded)
         with fits.open(source, memmap=not self.compressed, lazy_load_hdus=True) as hdus:
-            yield hdus
+            found = [hdus[index] for index in range(first, len(self.units))]
+            # astropy has a class of its own for what it thinks corrupt.
+            if {type(hdu).__name__ for hdu in found} - {kind}:
+                text = f"has units that are not all {kind}: {[type(hdu).__name__ for hdu in found]}"
+                raise refuse(self.path, text, "fetch the file again")
+            yield found
 
 
 @contextmanager
@@ -120,23 +124,14 @@ def open_guarded(path: str | os.PathLike[str], last: int | None = 1) -> Iterator
 
 @contextmanager
 def _translated(path: Path) -> Iterator[None]:
-    from astropy.io.fits import VerifyError
-
     try:
         yield
-    except SpinsdwError:
+    except (SpinsdwError, MemoryError):
         raise
-    except (
-        OSError,
-        EOFError,
-        ValueError,
-        TypeError,
-        LookupError,
-        OverflowError,
-        zlib.error,
-        VerifyError,
-    ) as error:
-        found = f"cannot be read as FITS ({type(error).__name__}: {error})"
+    # On damaged headers astropy raises nearly any class: UnboundLocalError was seen too.
+    except Exception as error:
+        # Quoted, because the text may hold whatever stood in the header.
+        found = f"cannot be read as FITS ({type(error).__name__}: {str(error)[:200]!r})"
         raise refuse(path, found, "check the file with fitsverify or fetch it again") from error
 
 

@@ -207,8 +207,8 @@ def read_map(  # noqa: PLR0913 - each keyword stands for one card a header may l
         name = _intensity_column(table) if column is None else table.resolve(column)
         table.check_memory(1, max_memory)
         labels = (table.unit(name), table.coordinates, name, table.sentinel)
-        with table.file.opened() as hdus:
-            return HealpixMap(_sky(table, hdus[hdu].data, name), *labels)
+        with table.file.opened("BinTableHDU", hdu) as (found,):
+            return HealpixMap(_sky(table, found.data, name), *labels)
 
 
 def read_polarisation(  # noqa: PLR0913 - each keyword stands for one card a header may lack
@@ -434,12 +434,11 @@ def _components(
 ) -> list[_Component]:
     table.check_memory(maps, max_memory)
     polconv, coordinates, units = table.polconv, table.coordinates, map(table.unit, names)
-    with table.file.opened() as hdus:
-        data = hdus[table.hdu].data
+    with table.file.opened("BinTableHDU", table.hdu) as (found,):
         return [
             _Component(
                 path=table.file.path,
-                values=_sky(table, data, name),
+                values=_sky(table, found.data, name),
                 polconv=polconv,
                 column=name,
                 unit=unit,
