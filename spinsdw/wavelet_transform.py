@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -150,7 +151,7 @@ class SpinWaveletTransform:
     @property
     def bandlimits(self) -> dict[int, int]:
         """Bandlimit at which each scale is sampled."""
-        return {j: self._grid_of(self._tiling.scale_bandlimit(j)).bandlimit for j in self.scales}
+        return {j: self.grid_of(self._tiling.scale_bandlimit(j)).bandlimit for j in self.scales}
 
     @property
     def orientations(self) -> Array:
@@ -162,7 +163,7 @@ class SpinWaveletTransform:
         """Shape of the scaling part and of each scale, for one signal."""
         found: dict[int | str, tuple[int, ...]] = {"scaling": self._scaling_transform.shape}
         for j in self.scales:
-            grid = self._grid_of(self._tiling.scale_bandlimit(j))
+            grid = self.grid_of(self._tiling.scale_bandlimit(j))
             found[j] = (self.directions, *grid.shape)
         return found
 
@@ -192,12 +193,13 @@ class SpinWaveletTransform:
             "real": self.real,
         }
 
-    def _grid_of(self, bandlimit: int) -> Sampling:
+    def grid_of(self, bandlimit: int) -> Sampling:
+        """Return the grid for coefficients of a bandlimit: the full one without multiresolution."""
         return type(self._grid)(bandlimit if self.multiresolution else self.bandlimit)
 
     @functools.cached_property
     def _scaling_transform(self) -> SpinHarmonicTransform:
-        grid = self._grid_of(self._tiling.scaling_bandlimit)
+        grid = self.grid_of(self._tiling.scaling_bandlimit)
         return SpinHarmonicTransform(
             grid.bandlimit, 0, sampling=grid, real=self.real, threads=self.threads
         )
@@ -214,7 +216,7 @@ class SpinWaveletTransform:
         """Return the sums of one scale, conj(psi) padded to its grid, and its lowest degree."""
         directionality = self.wavelets.directionality
         orders = directionality.orders
-        grid = self._grid_of(self._tiling.scale_bandlimit(scale))
+        grid = self.grid_of(self._tiling.scale_bandlimit(scale))
         kept = [i for i, n in enumerate(orders) if abs(n) < grid.bandlimit]
         psi = self.wavelets.wavelet_harmonics(scale)
         weights = np.zeros((len(kept), grid.bandlimit), dtype=np.complex128)
@@ -274,20 +276,35 @@ class SpinWaveletTransform:
         wavelets = {j: self._scale_to_grid(flm, j, adjoint=adjoint) for j in self.scales}
         return WaveletCoefficients(scaling, wavelets, self._parameters)
 
-    def _recompose(self, coefficients: WaveletCoefficients, *, adjoint: bool) -> Array:
+    def _recompose(
+        self,
+        coefficients: WaveletCoefficients,
+        *,
+        adjoint: bool,
+        parts: Collection[int | str] | None = None,
+    ) -> Array:
         checked = self._checked(coefficients)
         scaling = checked["scaling"]
-        transform = self._scaling_transform
-        part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
-        part = part * self._scaling_factor
-        flm = np.zeros((*part.shape[:-1], self.bandlimit**2), dtype=np.complex128)
+        wanted = set(self.shapes) if parts is None else self._checked_parts(parts)
+        flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
         for j in self.scales:
-            self._add_scale(checked[j], j, rows, adjoint=adjoint)
+            if j in wanted:
+                self._add_scale(checked[j], j, rows, adjoint=adjoint)
         if self.real:
             fill_negative_orders(rows)
-        flm[..., : part.shape[-1]] += part
+        if "scaling" in wanted:
+            transform = self._scaling_transform
+            part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
+            flm[..., : part.shape[-1]] += part * self._scaling_factor
         return flm
+
+    def _checked_parts(self, parts: Collection[int | str]) -> set[int | str]:
+        known = set(self.shapes)
+        if not set(parts) <= known:
+            msg = f"parts={tuple(parts)!r} must be among 'scaling' and the scales {self.scales}."
+            raise ParameterError(msg)
+        return set(parts)
 
     def _checked(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
         if not isinstance(coefficients, WaveletCoefficients):
@@ -332,13 +349,20 @@ class SpinWaveletTransform:
         """
         return self._decompose(self._spin_part(flm), adjoint=False)
 
-    def synthesis_harmonic(self, coefficients: WaveletCoefficients) -> Array:
+    def synthesis_harmonic(
+        self,
+        coefficients: WaveletCoefficients,
+        *,
+        parts: Collection[int | str] | None = None,
+    ) -> Array:
         """Compute harmonic coefficients from wavelet coefficients: the inverse of the analysis.
 
         Parameters
         ----------
         coefficients : WaveletCoefficients
             As `analysis` returns them, or changed.
+        parts : collection of int or "scaling", optional
+            The scales to add up; all, and the scaling part, when None.
 
         Returns
         -------
@@ -352,7 +376,7 @@ class SpinWaveletTransform:
         DataError
             If a value is not a finite number.
         """
-        return self._spin_part(self._recompose(coefficients, adjoint=False))
+        return self._spin_part(self._recompose(coefficients, adjoint=False, parts=parts))
 
     def adjoint_analysis_harmonic(self, coefficients: WaveletCoefficients) -> Array:
         """Apply the adjoint of `analysis_harmonic`; shapes of `synthesis_harmonic`."""

@@ -1,0 +1,354 @@
+"""`EBSeparator`: E and B maps from Q and U on the full or the masked sky."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from spinsdw.coefficients import WaveletCoefficients
+from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.harmonics import multiply_by_degree, polarisation_factor
+from spinsdw.healpix import (
+    HealpixFit,
+    check_mask,
+    clean_polarisation,
+    nested_to_ring,
+    ring_to_nested,
+)
+from spinsdw.sampling.base import check_bandlimit
+from spinsdw.separation.pseudo import PseudoMethod
+from spinsdw.separation.report import Clock, check_choice
+from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
+from spinsdw.tiling import ScaleDiscretisedTiling
+from spinsdw.wavelet_transform import SpinWaveletTransform
+
+__all__ = ["EBMaps", "EBSeparator", "SeparationInfo"]
+
+Array = np.ndarray[Any, Any]
+Output = Literal["fields", "derivatives", "potentials"]
+
+# Every method is one file of spinsdw.separation; it turns the wavelet coefficients of the masked
+# map into those that are synthesised, and says how far each was kept.
+_METHODS = {"pseudo": PseudoMethod}
+_DEFAULT_LOWEST_SCALE = 2
+
+
+@dataclass(frozen=True)
+class SeparationInfo:
+    """What a separation did and how well it went.
+
+    Attributes
+    ----------
+    method : str
+        Name of the estimator.
+    bandlimit : int
+        Degrees used are below it.
+    scales : tuple of int
+        The wavelet scales.
+    sky_fraction : float
+        Mean of the mask.
+    kept_fraction : dict
+        Mean weight of the coefficients of each scale, and of the scaling part.
+    fit : HealpixFit or None
+        How well harmonic coefficients fit a HEALPix map; None on grids, where they are exact.
+    seconds : dict of str to float
+        Wall time of each step.
+    """
+
+    method: str
+    bandlimit: int
+    scales: tuple[int, ...]
+    sky_fraction: float
+    kept_fraction: Mapping[int | str, float]
+    fit: HealpixFit | None
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class EBMaps:
+    """E and B maps with their weights.
+
+    Attributes
+    ----------
+    E, B : ndarray, float64
+        The maps, pixelised as Q and U, in their unit (for ``output="fields"``).
+    weight : ndarray, float64
+        Where to trust the maps, from 0 to 1: the weights of all scales, averaged with the power
+        each scale has in E and B.
+    weights : mapping of int to ndarray
+        The same for every scale.
+    coefficients : WaveletCoefficients
+        The weighted spin-2 wavelet coefficients: -Re is E, -Im is B.
+    info : SeparationInfo
+        What was done.
+    """
+
+    E: Array
+    B: Array
+    weight: Array
+    weights: Mapping[int, Array]
+    coefficients: WaveletCoefficients = field(repr=False)
+    info: SeparationInfo
+
+
+@dataclass(frozen=True, eq=False)
+class EBSeparator:
+    """Separate Q and U into E and B with spin wavelets.
+
+    Parameters
+    ----------
+    bandlimit : int or None, optional
+        L: degrees are l < L. None: 2 nside + 1 on HEALPix, the grid's own on MW and MWSS.
+    mask : ndarray, optional
+        1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). None: full sky.
+    method : str, default "pseudo"
+        The estimator; "pseudo" weighs wavelet coefficients by the share of their energy in holes.
+    directions : int, default 1
+        N of the wavelets.
+    dilation : float, default 2.0
+        Ratio of neighbouring scales.
+    lowest_scale : int, default 2
+        Structures larger than scale J0 belong to the scaling part.
+    taper : float, default 0.2
+        Share of its energy in the hole, in (0, 1], at which a coefficient is dropped.
+    output : {"fields", "derivatives", "potentials"}, default "fields"
+        E and B; or N_l E_lm and N_l B_lm, second derivatives of Q and U; or E_lm / N_l and
+        B_lm / N_l; N_l = sqrt((l+2)! / (l-2)!).
+    nest : bool, default False
+        Whether HEALPix maps and mask are in nested order.
+    threads : int, optional
+        Threads to use; all cores when None.
+
+    Notes
+    -----
+    Q and U are in the COSMO frame (HEALPix's own). What depends on the mask only is computed at the
+    first separation and kept.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spinsdw.sampling import MW
+    >>> q = np.sin(MW(16).colatitudes)[:, None] ** 2 * np.ones(31)
+    >>> maps = EBSeparator(16).separate(q, 0 * q)
+    >>> maps.E.shape
+    (16, 31)
+    >>> bool(np.abs(maps.B).max() < 1e-13 * np.abs(maps.E).max())
+    True
+    """
+
+    bandlimit: int | None = None
+    mask: Array | None = None
+    method: str = "pseudo"
+    directions: int = 1
+    dilation: float = 2.0
+    lowest_scale: int = 2
+    taper: float = 0.2
+    output: Output = "fields"
+    nest: bool = False
+    threads: int | None = None
+
+    def __init__(  # noqa: PLR0913 - the choices of an analysis, each with its default
+        self,
+        bandlimit: int | None = None,
+        mask: Array | None = None,
+        *,
+        method: str = "pseudo",
+        directions: int = 1,
+        dilation: float = 2.0,
+        lowest_scale: int | None = None,
+        taper: float = 0.2,
+        output: Output = "fields",
+        nest: bool = False,
+        threads: int | None = None,
+    ) -> None:
+        if bandlimit is None and mask is None:
+            msg = "bandlimit=None needs a mask to take the resolution from; give one of the two."
+            raise ParameterError(msg)
+        check_choice("method", method, tuple(_METHODS))
+        check_choice("output", output, get_args(Output))
+        if not 0 < taper <= 1:
+            msg = f"taper={taper} must be a share of energy in (0, 1]; 0.2 suits most masks."
+            raise ParameterError(msg)
+        sky, weights = None, None
+        if mask is not None:
+            values = np.asarray(mask)
+            sky = sky_of(values, bandlimit, name="mask", threads=threads)
+            weights = check_mask(values, values.shape)
+            weights = nested_to_ring(weights) if nest and weights.ndim == 1 else weights
+            weights.setflags(write=False)
+            bandlimit = sky.bandlimit
+        bandlimit = check_bandlimit(bandlimit)
+        if lowest_scale is None:
+            lowest_scale = min(
+                _DEFAULT_LOWEST_SCALE,
+                ScaleDiscretisedTiling(bandlimit, dilation=dilation).highest_scale,
+            )
+        settings = (bandlimit, weights, method, directions, dilation, lowest_scale)
+        values = (*settings, float(taper), output, bool(nest), threads)
+        for item, value in zip(fields(self), values, strict=True):
+            object.__setattr__(self, item.name, value)
+        object.__setattr__(self, "_sky", sky)
+        # Checks directions, dilation, lowest_scale and threads now rather than at the first map.
+        self._transform("mw")
+
+    def _transform(self, sampling: str) -> SpinWaveletTransform:
+        return SpinWaveletTransform(
+            check_bandlimit(self.bandlimit),
+            2,
+            self.directions,
+            dilation=self.dilation,
+            lowest_scale=self.lowest_scale,
+            sampling=sampling,
+            threads=self.threads,
+        )
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - a separator keeps what its mask costs
+    def _prepared(self, sky: HealpixSky | GridSky) -> PseudoMethod:
+        transform = self._transform(sky.sampling_name)
+        return _METHODS[self.method](transform, sky, self.mask, self.taper)
+
+    def _sky_of(self, q: Array) -> HealpixSky | GridSky:
+        mask_sky: HealpixSky | GridSky | None = self._sky  # type: ignore[attr-defined]
+        sky = sky_of(q, self.bandlimit, name="q", threads=self.threads)
+        if mask_sky is not None and (self.mask is None or q.shape != self.mask.shape):
+            msg = f"q has shape {q.shape} but the mask {np.shape(self.mask)}; they must be alike."
+            raise ShapeError(msg)
+        return sky
+
+    def _observed(self, q: Array, u: Array) -> tuple[Array, Array]:
+        """Return Q and U in ring order, zero and finite where masked."""
+        q, u = np.asarray(q), np.asarray(u)
+        if self.nest and q.ndim == 1 and q.shape == u.shape:
+            q, u = nested_to_ring(q), nested_to_ring(u)
+        cleaned_q, cleaned_u, found = clean_polarisation(q, u, self.mask)
+        given = np.ones(q.shape) if self.mask is None else self.mask
+        lost = np.count_nonzero((found == 0) & (given > 0))
+        if lost:
+            msg = (
+                f"q and u are not observed at {lost} pixels where the mask is not 0; set the mask "
+                "to 0 there and make a separator with it."
+            )
+            raise DataError(msg)
+        return cleaned_q, cleaned_u
+
+    def separate(self, q: Array, u: Array) -> EBMaps:
+        """Separate Stokes Q and U into E and B.
+
+        Parameters
+        ----------
+        q, u : ndarray, real
+            Stokes parameters, COSMO frame, any unit: HEALPix maps (12 nside^2,), MW maps
+            (L, 2 L - 1) or MWSS maps (L + 1, 2 L), pixelised as the mask is. Pixels where the mask
+            is 0 may hold anything.
+
+        Returns
+        -------
+        EBMaps
+            E, B, weights, wavelet coefficients and a report, in the order and unit of Q and U.
+
+        Raises
+        ------
+        ShapeError
+            If the shape is no HEALPix, MW or MWSS map, or not the mask's.
+        DataError
+            If an observed pixel is NaN, infinite or UNSEEN, or Q or U is complex.
+        ParameterError
+            If the shape does not fit the bandlimit.
+        """
+        clock = Clock()
+        cleaned_q, cleaned_u = self._observed(q, u)
+        sky = self._sky_of(cleaned_q)
+        prepared = self._prepared(sky)
+        keep = prepared.weights
+        clock.stop("mask preparation")
+        p = cleaned_q + 1j * cleaned_u
+        plm, fit = sky.polarisation_coefficients(p if self.mask is None else self.mask * p)
+        clock.stop("harmonic analysis")
+        coefficients = prepared.apply(prepared.transform.analysis_harmonic(plm))
+        clock.stop("wavelet analysis")
+        eb_flm = self._fields(prepared.transform.synthesis_harmonic(coefficients))
+        eb = sky.scalar_map(eb_flm)
+        clock.stop("synthesis")
+        weights, weight = self._weight_maps(prepared, coefficients, q.shape)
+        clock.stop("weight maps")
+        info = SeparationInfo(
+            method=self.method,
+            bandlimit=sky.bandlimit,
+            scales=prepared.transform.scales,
+            sky_fraction=1.0 if self.mask is None else float(np.mean(self.mask)),
+            kept_fraction={key: float(np.mean(values)) for key, values in keep.items()},
+            fit=fit,
+            seconds=clock.seconds,
+        )
+        return EBMaps(
+            E=self._reordered(eb.real),
+            B=self._reordered(eb.imag),
+            weight=self._reordered(weight),
+            weights={j: self._reordered(values) for j, values in weights.items()},
+            coefficients=coefficients,
+            info=info,
+        )
+
+    def bands(self, maps: EBMaps) -> dict[int | str, tuple[Array, Array]]:
+        """Compute the E and B maps of each scale alone; they add up to E and B.
+
+        Parameters
+        ----------
+        maps : EBMaps
+            What `separate` of this separator returned.
+
+        Returns
+        -------
+        dict of (int or "scaling") to (ndarray, ndarray)
+            E and B of every scale and of the scaling part.
+
+        Raises
+        ------
+        ShapeError
+            If the maps are of another separator.
+        """
+        observed = nested_to_ring(maps.E) if self.nest and maps.E.ndim == 1 else maps.E
+        sky = self._sky_of(observed)
+        transform = self._prepared(sky).transform
+        found: dict[int | str, tuple[Array, Array]] = {}
+        for key in transform.shapes:
+            flm = transform.synthesis_harmonic(maps.coefficients, parts=(key,))
+            eb = sky.scalar_map(self._fields(flm))
+            found[key] = self._reordered(eb.real), self._reordered(eb.imag)
+        return found
+
+    def _reordered(self, values: Array) -> Array:
+        if self.nest and values.ndim == 1:
+            return ring_to_nested(values)
+        return np.ascontiguousarray(values)
+
+    def _fields(self, plm: Array) -> Array:
+        """E_lm + i B_lm = -P_lm, with the factor of the output asked for."""
+        factor = polarisation_factor(check_bandlimit(self.bandlimit))
+        if self.output == "fields":
+            return -plm
+        if self.output == "derivatives":
+            return multiply_by_degree(-plm, factor)
+        inverse = np.divide(1.0, factor, out=np.zeros_like(factor), where=factor > 0)
+        return multiply_by_degree(-plm, inverse)
+
+    def _weight_maps(
+        self, prepared: PseudoMethod, coefficients: WaveletCoefficients, shape: tuple[int, ...]
+    ) -> tuple[dict[int, Array], Array]:
+        transform, sky = prepared.transform, prepared.sky
+        if self.mask is None:
+            ones = np.ones(shape)
+            return {j: ones.copy() for j in transform.scales}, ones
+        weights, weight, total = {}, np.zeros(shape), 0.0
+        for j in transform.scales:
+            weights[j] = position_map(prepared.weights[j].mean(axis=0), transform, j, sky)
+            weights[j] *= self.mask > 0
+            power = float(np.mean(np.abs(coefficients[j]) ** 2))
+            weight += power * weights[j]
+            total += power
+        return weights, weight / total if total > 0 else weight

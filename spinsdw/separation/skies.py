@@ -1,0 +1,163 @@
+"""`Sky`: the pixelisation that Q and U come on, as the separation sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.harmonics import resize
+from spinsdw.healpix import HealpixFit, default_bandlimit, flm_to_map, map_to_flm, nside_of
+from spinsdw.ring_transform import HealpixTransform
+from spinsdw.sampling import MW, MWSS, Sampling
+from spinsdw.spin_transform import SpinHarmonicTransform
+from spinsdw.wavelet_transform import SpinWaveletTransform
+
+__all__ = ["GridSky", "HealpixSky", "Sky", "position_map", "sky_of"]
+
+Array = np.ndarray[Any, Any]
+
+
+class Sky(Protocol):
+    """What a separation asks of the sky it works on."""
+
+    @property
+    def bandlimit(self) -> int: ...
+
+    @property
+    def sampling_name(self) -> str:
+        """Kind of grid the wavelet coefficients of this sky live on."""
+        ...
+
+    def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
+        """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
+        ...
+
+    def scalar_map(self, flm: Array) -> Array:
+        """Return the complex map of spin-0 coefficients of any bandlimit."""
+        ...
+
+    def integrals(self, weights: Array, bandlimit: int) -> Array:
+        """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
+        ...
+
+
+@dataclass(frozen=True)
+class HealpixSky:
+    """HEALPix maps in ring order."""
+
+    nside: int
+    bandlimit: int
+    threads: int | None = None
+    tolerance: float = 1e-10
+
+    @property
+    def sampling_name(self) -> str:
+        return "mw"
+
+    def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
+        return map_to_flm(
+            p, self.bandlimit, 2, tolerance=self.tolerance, threads=self.threads
+        )
+
+    def scalar_map(self, flm: Array) -> Array:
+        return flm_to_map(flm, self.nside, threads=self.threads)
+
+    def integrals(self, weights: Array, bandlimit: int) -> Array:
+        # A sum over pixel centres: no fit, so that a share computed from it stays non-negative.
+        transform = HealpixTransform(self.nside, bandlimit, real=True, threads=self.threads)
+        return transform.adjoint_synthesis(weights) * (4 * np.pi / weights.size)
+
+
+@dataclass(frozen=True)
+class GridSky:
+    """Maps on an MW or MWSS grid."""
+
+    sampling: Sampling
+    threads: int | None = None
+
+    @property
+    def bandlimit(self) -> int:
+        return self.sampling.bandlimit
+
+    @property
+    def sampling_name(self) -> str:
+        return self.sampling.name
+
+    def _transform(self, spin: int, *, real: bool = False) -> SpinHarmonicTransform:
+        return SpinHarmonicTransform(
+            self.bandlimit, spin, sampling=self.sampling, real=real, threads=self.threads
+        )
+
+    def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
+        return self._transform(2).analysis(p), None
+
+    def scalar_map(self, flm: Array) -> Array:
+        return self._transform(0).synthesis(resize(flm, self.bandlimit))
+
+    def integrals(self, weights: Array, bandlimit: int) -> Array:
+        # Between its samples a mask on this grid is the band-limited function they define.
+        return resize(self._transform(0, real=True).analysis(weights), bandlimit)
+
+
+def position_map(
+    values: Array, transform: SpinWaveletTransform, scale: int, sky: HealpixSky | GridSky
+) -> Array:
+    """Return weights given at the positions of one scale's coefficients at the sky's points.
+
+    Parameters
+    ----------
+    values : ndarray, shape (rings, phi), float64
+        Weights in [0, 1] at the scale's positions.
+    transform : SpinWaveletTransform
+        What the scale belongs to.
+    scale : int
+        The scale j.
+    sky : HealpixSky or GridSky
+        Where the weights are wanted.
+
+    Returns
+    -------
+    ndarray, float64
+        Weights in [0, 1], interpolated by the scale's own harmonics.
+    """
+    grid = transform.grid_of(transform.bandlimits[scale])
+    flm = SpinHarmonicTransform(
+        grid.bandlimit, sampling=grid, real=True, threads=transform.threads
+    ).analysis(values)
+    return np.clip(sky.scalar_map(flm).real, 0.0, 1.0)
+
+
+def sky_of(
+    values: Array, bandlimit: int | None, *, name: str, threads: int | None
+) -> HealpixSky | GridSky:
+    """Return the sky a map or mask is on: HEALPix if it is 1-D, MW or MWSS if it is 2-D.
+
+    Raises
+    ------
+    ShapeError
+        If the shape is none of theirs.
+    ParameterError
+        If the shape does not fit the bandlimit.
+    """
+    if values.ndim == 1:
+        nside = nside_of(values)
+        return HealpixSky(nside, bandlimit or default_bandlimit(nside), threads)
+    if values.ndim == 2:
+        rings, phis = values.shape
+        for sampling, limit in ((MW, rings), (MWSS, rings - 1)):
+            if limit >= 1 and sampling(limit).shape == (rings, phis):
+                if bandlimit not in {None, limit}:
+                    msg = (
+                        f"{name} has the shape {values.shape} of bandlimit {limit}, not of "
+                        f"bandlimit={bandlimit}; make both agree."
+                    )
+                    raise ParameterError(msg)
+                return GridSky(sampling(limit), threads)
+    msg = (
+        f"{name} has shape {values.shape}; it must be a HEALPix map (12 nside^2,), an MW map "
+        "(L, 2 L - 1) or an MWSS map (L + 1, 2 L)."
+    )
+    raise ShapeError(msg)
