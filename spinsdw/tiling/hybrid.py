@@ -107,7 +107,9 @@ class HybridTiling(LowpassTiling):
         for dilation, end in zip(self.dilations, self.transitions, strict=False):
             start = edges[-1]
             steps = max(1, round(math.log(end / start) / math.log(dilation)))
-            edges += [start * (end / start) ** (step / steps) for step in range(1, steps)] + [end]
+            between = [start * (end / start) ** (step / steps) for step in range(1, steps)]
+            # To 12 digits, so that a whole degree does not become a hair more and is rounded up.
+            edges += [*(float(f"{edge:.12g}") for edge in between), end]
         last = Fraction(edges.pop())
         factors = powers_up_to(self.dilations[-1], (self.bandlimit - 1) / last)
         rest = [last * factor for factor in factors]
