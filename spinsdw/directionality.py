@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinsdw.errors import DataError
-from spinsdw.harmonics import check_integer
+from spinsdw.harmonics import check_bandlimit, check_integer
 
 __all__ = ["Directionality"]
 
@@ -110,7 +110,7 @@ class Directionality:
         >>> np.allclose(np.sum(np.abs(zeta[:, 1:]) ** 2, axis=0), 1)
         True
         """
-        bandlimit = check_integer(bandlimit, "bandlimit", minimum=1)
+        bandlimit = check_bandlimit(bandlimit)
         size = self.directions
         phase = 1.0 if size % 2 else 1.0j
         zeta = np.zeros((size, bandlimit), dtype=np.complex128)

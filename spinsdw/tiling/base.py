@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spinsdw.errors import ParameterError
-from spinsdw.harmonics import check_integer
+from spinsdw.harmonics import check_bandlimit, check_integer
 
 __all__ = ["LowpassTiling", "Tiling", "read_only"]
 
@@ -189,9 +189,7 @@ class LowpassTiling(Tiling):
     lowest_scale: int = field(default=0, kw_only=True)
 
     def __post_init__(self) -> None:
-        remedy = "it is the highest degree + 1"
-        bandlimit = check_integer(self.bandlimit, "bandlimit", minimum=1, remedy=remedy)
-        object.__setattr__(self, "bandlimit", bandlimit)
+        object.__setattr__(self, "bandlimit", check_bandlimit(self.bandlimit))
         self._check_steps()
         self._check_lowest_scale()
 
