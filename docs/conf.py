@@ -1,3 +1,4 @@
+import re
 from importlib.metadata import metadata
 
 _facts = metadata("spinsdw")
@@ -17,6 +18,8 @@ extensions = [
 exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"]
 templates_path = ["_templates"]
 default_role = "py:obj"
+# Docstrings write absolute values as they are: |s| < L.
+rst_prolog = "\n".join(rf".. |{name}| replace:: \|{name}\|" for name in "lmnqs")
 
 # Equations are numbered by page: (1.3) is the third of the first numbered page.
 numfig = True
@@ -40,3 +43,14 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
 }
+
+
+def _link_equations(*event):
+    """Turn the labels that docstrings cite, such as eq-wavelet, into numbered links."""
+    lines = event[-1]
+    lines[:] = [re.sub(r"\beq(-[a-z]+)+\b", r":eq:`\g<0>`", line) for line in lines]
+
+
+def setup(app):
+    """Tell Sphinx what is done to docstrings."""
+    app.connect("autodoc-process-docstring", _link_equations)

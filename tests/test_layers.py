@@ -37,6 +37,7 @@ LAYERS = (  # bottom to top
     {"masks"},
     {"maps_io"},
     {"simulation"},
+    {"separation"},
     {"polarisation"},
     {"plotting"},
     {"ensemble"},
