@@ -48,7 +48,8 @@ sphinx_gallery_conf = {
 def _link_equations(*event):
     """Turn the labels that docstrings cite, such as eq-wavelet, into numbered links."""
     lines = event[-1]
-    lines[:] = [re.sub(r"\beq(-[a-z]+)+\b", r":eq:`\g<0>`", line) for line in lines]
+    pattern = r"\((eq(?:-[a-z]+)+)\)|\b(eq(?:-[a-z]+)+)\b"
+    lines[:] = [re.sub(pattern, r":eq:`\1\2`", line) for line in lines]
 
 
 def setup(app):
