@@ -19,13 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinsdw.errors import ParameterError
-from spinsdw.healpix import (
-    check_mask,
-    degrade_map,
-    nside_of,
-    pixel_directions,
-    upgrade_map,
-)
+from spinsdw.healpix import check_mask, degrade_map, nside_of, pixel_directions, upgrade_map
 
 __all__ = [
     "apodise",
@@ -174,17 +168,45 @@ def distance_to_edge(mask: ArrayLike) -> FloatArray:
     >>> bool(abs(distances.max() - np.radians(60)) < np.radians(3))
     True
     """
+    return _bounded_distance(_checked(mask), math.pi)
+
+
+def _bounded_distance(weights: FloatArray, bound: float) -> FloatArray:
+    """Return the distance to the nearest masked pixel, or infinity beyond ``bound``."""
     from scipy.spatial import cKDTree
 
-    weights = _checked(mask)
     masked = weights == 0
+    distances = np.where(masked, 0.0, np.inf)
     if not masked.any():
-        return np.full(weights.shape, np.inf)
+        return distances
     vectors = _vectors(*pixel_directions(nside_of(weights)))
-    distances = np.zeros(weights.shape)
-    chords, _ = cKDTree(vectors[masked]).query(vectors[~masked])
-    distances[~masked] = 2 * np.arcsin(np.minimum(chords / 2, 1))
+    edge = vectors[masked][_is_at_edge(vectors, masked)]
+    chords, _ = cKDTree(edge).query(vectors[~masked], distance_upper_bound=_chord(bound))
+    angles = 2 * np.arcsin(np.minimum(chords / 2, 1))
+    distances[~masked] = np.where(np.isfinite(chords), angles, np.inf)
     return distances
+
+
+def _is_at_edge(vectors: FloatArray, masked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which masked pixels can be the nearest one to an observed pixel.
+
+    Let c be nearest to x, and r just above the largest distance of a point from its pixel's
+    centre.  The point at distance r from c on the way to x lies in a pixel whose centre is nearer
+    to x than c, so is observed, and is less than 2 r from c.
+    """
+    import healpy
+    from scipy.spatial import cKDTree
+
+    reach = 2.01 * healpy.max_pixrad(math.isqrt(len(vectors) // 12))
+    observed = cKDTree(vectors[~masked])
+    chords, _ = observed.query(vectors[masked], distance_upper_bound=_chord(reach))
+    near: NDArray[np.bool_] = np.isfinite(chords)
+    return near
+
+
+def _chord(angle: float) -> float:
+    """Return a chord that spans a little more than ``angle`` on the unit sphere."""
+    return 2.001 * math.sin(min(angle, math.pi) / 2)
 
 
 def _checked(mask: ArrayLike) -> FloatArray:
@@ -223,15 +245,11 @@ def taper(depth: ArrayLike) -> FloatArray:
     return weights
 
 
-def _c1(x: FloatArray) -> FloatArray:
-    return x - np.sin(2 * np.pi * x) / (2 * np.pi)
-
-
-def _c2(x: FloatArray) -> FloatArray:
-    return (1 - np.cos(np.pi * x)) / 2
-
-
-PROFILES: dict[str, Callable[[FloatArray], FloatArray]] = {"smooth": taper, "C1": _c1, "C2": _c2}
+PROFILES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "smooth": taper,
+    "C1": lambda x: x - np.sin(2 * np.pi * x) / (2 * np.pi),
+    "C2": lambda x: (1 - np.cos(np.pi * x)) / 2,
+}
 
 
 def apodise(mask: ArrayLike, width: float, *, profile: str = "smooth") -> FloatArray:
@@ -286,7 +304,7 @@ def apodise(mask: ArrayLike, width: float, *, profile: str = "smooth") -> FloatA
         msg = f"width={width} must be in (0, pi] radians; np.radians(5) is a taper of 5 degrees."
         raise ParameterError(msg)
     weights = _checked(mask)
-    distances = np.minimum(distance_to_edge(weights), width)
+    distances = np.minimum(_bounded_distance(weights, width), width)
     return weights * PROFILES[profile](np.sin(distances / 2) / math.sin(width / 2))
 
 

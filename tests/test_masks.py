@@ -62,10 +62,20 @@ def test_galactic_cut_refuses_to_mask_everything():
         galactic_cut(2, 1.5)
 
 
-@pytest.mark.parametrize("nside", [1, 3, 8])
-def test_distance_is_to_the_nearest_masked_pixel(nside):
+@pytest.mark.parametrize(
+    ("nside", "mask"),
+    [
+        (1, random_mask(1, seed=1)),
+        (3, random_mask(3, seed=3)),
+        (8, random_mask(8, share=0.01)),
+        (8, random_mask(8, share=0.99)),
+        (8, galactic_cut(8, 0.6)),
+        (8, 1 - galactic_cut(8, 0.6)),
+        (8, np.arange(768) > 200),
+    ],
+)
+def test_distance_is_to_the_nearest_masked_pixel(nside, mask):
     """min over masked p' of the angle between p and p'"""
-    mask = random_mask(nside, seed=nside)
     expected = np.min(angle_table(nside)[:, mask == 0], axis=1)
     expected[mask == 0] = 0
     assert_close(distance_to_edge(mask), expected, ulps=64)

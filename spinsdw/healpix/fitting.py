@@ -18,7 +18,7 @@ bandlimit                  steps
 1.5 nside + 1              5 or 6
 2 nside + 1 (the default)  6 or 7
 2.5 nside + 1              11 or 12
-3 nside                    50 to more than 400
+3 nside                    50 to more than 500
 =========================  =====================
 
 A mask leaves modes that the observed pixels hardly see.  They converge slowly, a residual of
