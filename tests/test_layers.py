@@ -39,6 +39,7 @@ LAYERS = (  # bottom to top
     {"simulation"},
     {"separation"},
     {"polarisation"},
+    {"warmup"},
     {"plotting"},
     {"ensemble"},
     {"cli"},
