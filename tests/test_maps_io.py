@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import gzip
+import re
 import tracemalloc
 import warnings
 
@@ -431,6 +432,28 @@ def test_small_partial_file_cannot_ask_for_much_memory(tmp_path):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2**20
+
+
+@pytest.mark.parametrize("ordering", ["RING", "NESTED"])
+@pytest.mark.parametrize("polconv", ["COSMO", "IAU"])
+@pytest.mark.parametrize("is_partial", [False, True])
+def test_reading_takes_no_more_memory_than_was_checked(tmp_path, ordering, polconv, is_partial):
+    """A budget that suffices by the error's own count is not exceeded."""
+    columns = {name: (np.arange(12.0 * 64**2), "D", None) for name in "QU"}
+    cards = {"ORDERING": ordering, "POLCCONV": polconv, "NSIDE": 64}
+    if is_partial:
+        columns["PIXEL"] = np.arange(12 * 64**2), "K", None
+        cards["INDXSCHM"] = "EXPLICIT"
+    path = write_table(tmp_path / "m.fits", columns, **cards)
+    with pytest.raises(MemoryBudgetError) as refusal:
+        read_polarisation(path, max_memory=1)
+    budget = int(re.search(r"less than the (\d+) bytes", str(refusal.value))[1])
+    read_polarisation(path)
+    tracemalloc.start()
+    read_polarisation(path, max_memory=budget)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.05 * budget
 
 
 def test_memory_budget_is_held_against_the_maps(tmp_path):

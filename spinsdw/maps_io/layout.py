@@ -161,10 +161,11 @@ class SkyTable:
             raise refuse(self.file.path, found, "fetch the file again, or correct the header")
         return int(nside)
 
-    def check_memory(self, maps: int, max_memory: int | None) -> None:
+    def check_memory(self, maps: int, max_memory: int | None, *, is_turned: bool = False) -> None:
         """Raise MemoryBudgetError if so many maps, and the work on one of them, need too much."""
-        # While one column is converted: its values, and for NESTED two index arrays and a copy.
-        work = 4 if self.ordering == "NESTED" else 1
+        # Reordering, listing pixels and turning the sign of U each hold up to four more arrays.
+        is_plain = self.ordering == "RING" and not self.is_partial and not is_turned
+        work = 1 if is_plain else 4
         self.file.check_memory(8 * 12 * self.nside**2 * (maps + work), max_memory)
 
     def unit(self, name: str) -> str:

@@ -432,8 +432,8 @@ def _one_component(
 def _components(
     table: SkyTable, names: Sequence[str], max_memory: int | None, maps: int = 2
 ) -> list[_Component]:
-    table.check_memory(maps, max_memory)
     polconv, coordinates, units = table.polconv, table.coordinates, map(table.unit, names)
+    table.check_memory(maps, max_memory, is_turned=polconv != "COSMO")
     with table.file.opened("BinTableHDU", table.hdu) as (found,):
         return [
             _Component(
@@ -476,11 +476,16 @@ def _sky(table: SkyTable, data: Any, name: str) -> FloatArray:
     """Return a column as a whole-sky map in RING order."""
     values = np.array(data.field(name), dtype=np.float64).reshape(-1)
     if table.is_partial:
-        pixels = _pixels(table, data, values.size)
-        values, listed = np.full(12 * table.nside**2, UNSEEN), values
-        values[pixels] = listed
+        values = _spread(table, data, values)
     if table.ordering == "NESTED":
         values = nested_to_ring(values)
+    return values
+
+
+def _spread(table: SkyTable, data: Any, listed: FloatArray) -> FloatArray:
+    """Return the whole sky, UNSEEN where the file lists no pixel."""
+    values = np.full(12 * table.nside**2, UNSEEN)
+    values[_pixels(table, data, listed.size)] = listed
     return values
 
 
