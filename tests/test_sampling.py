@@ -1,0 +1,178 @@
+"""The laws of the samplings of the sphere."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from spinsdw.errors import ParameterError
+from spinsdw.sampling import MW, MWSS, HealpixRings, Sampling, resolve_sampling
+from tests.helpers import assert_close, random_like, small_d
+
+GRIDS = [MW, MWSS]
+BANDLIMITS = [1, 2, 3, 4, 9]
+
+
+def columns_of(grid, n_m, value):
+    """Columns, shape (1, n_m, rings), of which order m = 0 or 1 holds the rings of ``value``."""
+    columns = np.zeros((1, n_m, grid.n_rings), dtype=complex)
+    columns[0, 0] = columns[0, 1] = value
+    return columns
+
+
+@pytest.mark.parametrize("bandlimit", BANDLIMITS)
+def test_mw_rings_are_odd_multiples_of_half_a_step(bandlimit):
+    """theta_t = (2t + 1) pi / (2L - 1), t < L; phi_p = 2 pi p / (2L - 1)."""
+    grid = MW(bandlimit)
+    step = 2 * np.pi / (2 * bandlimit - 1)
+    assert grid.shape == (grid.n_rings, grid.n_phi) == (bandlimit, 2 * bandlimit - 1)
+    assert_close(grid.colatitudes, (np.arange(bandlimit) + 0.5) * step, ulps=2)
+    assert_close(grid.longitudes, np.arange(2 * bandlimit - 1) * step, ulps=2)
+    assert grid.colatitudes[-1] == np.pi
+
+
+@pytest.mark.parametrize("bandlimit", BANDLIMITS)
+def test_mwss_rings_are_multiples_of_a_step_from_pole_to_pole(bandlimit):
+    """theta_t = 2 pi t / 2L, t <= L; phi_p = 2 pi p / 2L."""
+    grid = MWSS(bandlimit)
+    step = np.pi / bandlimit
+    assert grid.shape == (grid.n_rings, grid.n_phi) == (bandlimit + 1, 2 * bandlimit)
+    assert_close(grid.colatitudes, np.arange(bandlimit + 1) * step, ulps=2)
+    assert_close(grid.longitudes, np.arange(2 * bandlimit) * step, ulps=2)
+    assert grid.colatitudes[0] == 0
+    assert grid.colatitudes[-1] == np.pi
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("n", [-3, 0, 1, 2])
+def test_quadrature_makes_wigner_functions_orthogonal(grid, n):
+    """2 pi sum_t d^l_mn(t) [d^l'_mn](t) = 4 pi / (2l + 1) delta_ll', every l, l' < L."""
+    sampling, n_m = grid(9), grid(9).n_phi
+    for m in (0, 1, -1, 4, -8):
+        lowest = max(abs(m), abs(n))
+        rows = [small_d(el, n, sampling.colatitudes)[:, el + m] for el in range(lowest, 9)]
+        for i, row in enumerate(rows):
+            columns = np.zeros((1, n_m, sampling.n_rings), dtype=complex)
+            columns[0, m] = n_m * row
+            sampling.weigh_columns(columns, (n,), threads=1)
+            found = np.array(rows) @ columns[0, m]
+            desired = np.zeros(len(rows))
+            desired[i] = 4 * np.pi / (2 * (lowest + i) + 1)
+            np.testing.assert_allclose(found, desired, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("n", [0, 1])
+def test_quadrature_is_a_real_symmetric_matrix(grid, n):
+    """The adjoints rest on it: Q = Q^T = conj(Q), for even and for odd m."""
+    sampling = grid(6)
+    matrices = []
+    for row in np.eye(sampling.n_rings):
+        columns = columns_of(sampling, sampling.n_phi, row)
+        sampling.weigh_columns(columns, (n,), threads=1)
+        matrices.append(columns[0, :2])
+    for matrix in np.moveaxis(np.array(matrices), 1, 0):
+        assert_close(matrix, matrix.real, ulps=2)
+        assert_close(matrix, matrix.T, ulps=8)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_quadrature_of_a_half_series_is_that_of_its_columns(grid):
+    """Columns of real maps hold m >= 0 alone."""
+    sampling = grid(9)
+    full = random_like(np.empty((2, sampling.n_phi, sampling.n_rings), dtype=complex))
+    half = np.ascontiguousarray(full[:, : sampling.n_phi // 2 + 1])
+    sampling.weigh_columns(full, (-1, 1), threads=1)
+    sampling.weigh_columns(half, (-1, 1), threads=1)
+    assert_close(half[:, :9], full[:, :9], ulps=16)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("threads", [2, 3, 5])
+def test_quadrature_has_the_same_bits_on_any_number_of_threads(grid, threads):
+    sampling = grid(40)
+    one = random_like(np.empty((2, sampling.n_phi, sampling.n_rings), dtype=complex))
+    several = one.copy()
+    sampling.weigh_columns(one, (0, 3), threads=1)
+    sampling.weigh_columns(several, (0, 3), threads=threads)
+    assert np.array_equal(one, several)
+
+
+@pytest.mark.parametrize(("name", "grid"), [("mw", MW), ("MW", MW), ("mwss", MWSS), ("MwSS", MWSS)])
+def test_name_means_its_grid(name, grid):
+    assert resolve_sampling(name, 5) == grid(5)
+    assert resolve_sampling(grid(5), 5) == grid(5)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_grids_are_equal_by_value_and_frozen(grid):
+    assert grid(4) == grid(4)
+    assert grid(4) != grid(5)
+    assert hash(grid(4)) == hash(grid(4))
+    with pytest.raises(FrozenInstanceError):
+        grid(4).bandlimit = 5
+
+
+def test_kinds_of_grid_differ():
+    assert MW(4) != MWSS(4)
+    assert (MW.name, MWSS.name) == ("mw", "mwss")
+
+
+@pytest.mark.parametrize("name", ["gl", "", "mw ", None, 3, MW])
+def test_unknown_name_lists_those_known(name):
+    with pytest.raises(ParameterError, match=r"sampling=.* is not known; use one of 'mw', 'mwss'"):
+        resolve_sampling(name, 4)
+
+
+def test_grid_of_another_bandlimit_is_refused():
+    with pytest.raises(ParameterError, match="sampling has bandlimit 5 but the transform has 4"):
+        resolve_sampling(MW(5), 4)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("bandlimit", [0, -1, 2.5, 4.0, True, "4", None, np.float64(4)])
+def test_bandlimit_is_a_positive_integer(grid, bandlimit):
+    with pytest.raises(ParameterError, match=r"bandlimit=.* must be a positive integer"):
+        grid(bandlimit)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_bandlimit_may_be_an_integer_of_numpy(grid):
+    sampling = grid(np.int32(4))
+    assert type(sampling.bandlimit) is int
+    assert sampling == grid(4)
+
+
+def test_sampling_itself_is_abstract():
+    with pytest.raises(TypeError, match="abstract"):
+        Sampling(4)
+
+
+@pytest.mark.parametrize("nside", [1, 2, 3, 8])
+def test_healpix_rings_share_out_all_pixels(nside):
+    """12 nside^2 pixels on 4 nside - 1 rings, symmetric about the equator."""
+    rings = HealpixRings(nside)
+    assert rings.n_rings == 4 * nside - 1
+    assert rings.n_phi.sum() == rings.n_pixels == 12 * nside**2
+    assert np.array_equal(rings.starts, np.cumsum(rings.n_phi) - rings.n_phi)
+    assert np.array_equal(rings.n_phi, rings.n_phi[::-1])
+    assert_close(rings.colatitudes[::-1], np.pi - rings.colatitudes, ulps=1)
+
+
+@pytest.mark.parametrize("nside", [1, 2, 3, 8])
+def test_healpix_pixels_have_equal_areas(nside):
+    """The rings above one of cap ring i hold 2 i (i - 1) pixels, and z = 1 - i^2 / (3 nside^2)."""
+    rings = HealpixRings(nside)
+    i = np.arange(1, nside + 1)
+    assert_close(np.cos(rings.colatitudes[:nside]), 1 - i**2 / (3 * nside**2), ulps=4)
+    belt = np.arange(nside, 3 * nside + 1)
+    z = np.cos(rings.colatitudes[nside - 1 : 3 * nside])
+    np.testing.assert_allclose(z, 4 / 3 - 2 * belt / (3 * nside), rtol=0, atol=4e-16)
+
+
+@pytest.mark.parametrize("nside", [0, -2, 2.5, True])
+def test_nside_is_a_positive_integer(nside):
+    with pytest.raises(ParameterError, match=r"nside=.* must be a positive integer"):
+        HealpixRings(nside)
