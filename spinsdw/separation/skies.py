@@ -12,6 +12,7 @@ from spinsdw.harmonics import resize
 from spinsdw.healpix import HealpixFit, default_bandlimit, flm_to_map, map_to_flm, nside_of
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.sampling import MW, MWSS, Sampling
+from spinsdw.sampling.base import check_bandlimit
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -144,7 +145,8 @@ def sky_of(
     """
     if values.ndim == 1:
         nside = nside_of(values)
-        return HealpixSky(nside, bandlimit or default_bandlimit(nside), threads)
+        limit = default_bandlimit(nside) if bandlimit is None else check_bandlimit(bandlimit)
+        return HealpixSky(nside, limit, threads)
     if values.ndim == 2:
         rings, phis = values.shape
         for sampling, limit in ((MW, rings), (MWSS, rings - 1)):
