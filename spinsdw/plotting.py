@@ -468,7 +468,7 @@ def _draw_colour_bar(axes: Axes, image: AxesImage, values: NDArray[np.float64], 
     )
     bar.set_label(unit)
     bar.outline.set_linewidth(0.6)
-    bar.ax.locator_params(nbins=5)
+    bar.ax.locator_params(nbins=4)
 
 
 def _draw_kernel(axes: Axes, kernel: NDArray[np.float64], colour: Any, **style: Any) -> float:
