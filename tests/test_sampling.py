@@ -15,11 +15,10 @@ GRIDS = [MW, MWSS]
 BANDLIMITS = [1, 2, 3, 4, 9]
 
 
-def columns_of(grid, n_m, value):
-    """Columns, shape (1, n_m, rings), of which order m = 0 or 1 holds the rings of ``value``."""
-    columns = np.zeros((1, n_m, grid.n_rings), dtype=complex)
-    columns[0, 0] = columns[0, 1] = value
-    return columns
+def weigh(sampling, columns, orders, threads=1):
+    """Apply the quadrature to one row of columns for each order, in place."""
+    mixing = np.eye(len(orders), dtype=complex)
+    sampling.weigh_columns(columns, orders, mixing=mixing, threads=threads)
 
 
 @pytest.mark.parametrize("bandlimit", BANDLIMITS)
@@ -56,7 +55,7 @@ def test_quadrature_makes_wigner_functions_orthogonal(grid, n):
         for i, row in enumerate(rows):
             columns = np.zeros((1, n_m, sampling.n_rings), dtype=complex)
             columns[0, m] = n_m * row
-            sampling.weigh_columns(columns, (n,), threads=1)
+            weigh(sampling, columns, (n,))
             found = np.array(rows) @ columns[0, m]
             desired = np.zeros(len(rows))
             desired[i] = 4 * np.pi / (2 * (lowest + i) + 1)
@@ -70,8 +69,9 @@ def test_quadrature_is_a_real_symmetric_matrix(grid, n):
     sampling = grid(6)
     matrices = []
     for row in np.eye(sampling.n_rings):
-        columns = columns_of(sampling, sampling.n_phi, row)
-        sampling.weigh_columns(columns, (n,), threads=1)
+        columns = np.zeros((1, sampling.n_phi, sampling.n_rings), dtype=complex)
+        columns[0, :2] = row
+        weigh(sampling, columns, (n,))
         matrices.append(columns[0, :2])
     for matrix in np.moveaxis(np.array(matrices), 1, 0):
         assert_close(matrix, matrix.real, ulps=2)
@@ -84,9 +84,21 @@ def test_quadrature_of_a_half_series_is_that_of_its_columns(grid):
     sampling = grid(9)
     full = random_like(np.empty((2, sampling.n_phi, sampling.n_rings), dtype=complex))
     half = np.ascontiguousarray(full[:, : sampling.n_phi // 2 + 1])
-    sampling.weigh_columns(full, (-1, 1), threads=1)
-    sampling.weigh_columns(half, (-1, 1), threads=1)
+    weigh(sampling, full, (-1, 1))
+    weigh(sampling, half, (-1, 1))
     assert_close(half[:, :9], full[:, :9], ulps=16)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_quadrature_mixes_columns_into_orders_first(grid):
+    """Row i becomes the quadrature, for order n_i, of sum_k mixing_ik columns_k."""
+    sampling, orders = grid(7), (-2, 1)
+    mixing = random_like(np.empty((2, 3), dtype=complex), seed=1)
+    columns = random_like(np.empty((3, sampling.n_phi, sampling.n_rings), dtype=complex))
+    mixed = np.tensordot(mixing, columns, axes=1)
+    weigh(sampling, mixed, orders)
+    sampling.weigh_columns(columns, orders, mixing=mixing, threads=1)
+    assert_close(columns[:2], mixed, ulps=32)
 
 
 @pytest.mark.parametrize("grid", GRIDS)
@@ -95,8 +107,8 @@ def test_quadrature_has_the_same_bits_on_any_number_of_threads(grid, threads):
     sampling = grid(40)
     one = random_like(np.empty((2, sampling.n_phi, sampling.n_rings), dtype=complex))
     several = one.copy()
-    sampling.weigh_columns(one, (0, 3), threads=1)
-    sampling.weigh_columns(several, (0, 3), threads=threads)
+    weigh(sampling, one, (0, 3))
+    weigh(sampling, several, (0, 3), threads)
     assert np.array_equal(one, several)
 
 
@@ -134,7 +146,7 @@ def test_grid_of_another_bandlimit_is_refused():
 @pytest.mark.parametrize("grid", GRIDS)
 @pytest.mark.parametrize("bandlimit", [0, -1, 2.5, 4.0, True, "4", None, np.float64(4)])
 def test_bandlimit_is_a_positive_integer(grid, bandlimit):
-    with pytest.raises(ParameterError, match=r"bandlimit=.* must be a positive integer"):
+    with pytest.raises(ParameterError, match=r"bandlimit=.* must be an integer of at least 1"):
         grid(bandlimit)
 
 

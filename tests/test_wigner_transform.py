@@ -94,7 +94,7 @@ def test_analysis_undoes_synthesis_at_size(bandlimit, orders, sampling):
     coefficients = random_coefficients(bandlimit, orders)
     found = transform.analysis(transform.synthesis(coefficients))
     assert_close(found, coefficients, ulps=tolerance(bandlimit))
-    assert relative_error(found, coefficients) <= (bandlimit + 4) * EPS
+    assert relative_error(found, coefficients) <= (2 * bandlimit + 8) * EPS
 
 
 @pytest.mark.parametrize("sampling", GRIDS)
@@ -268,7 +268,7 @@ def test_objects_describe_themselves_and_are_frozen():
 
 @pytest.mark.parametrize("bandlimit", [0, -1, 2.5, True, "8", None])
 def test_bandlimit_is_a_positive_integer(bandlimit):
-    with pytest.raises(ParameterError, match=r"bandlimit=.* must be a positive integer"):
+    with pytest.raises(ParameterError, match=r"bandlimit=.* must be an integer of at least 1"):
         WignerTransform(bandlimit, (0,))
 
 

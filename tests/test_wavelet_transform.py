@@ -1,0 +1,618 @@
+"""The laws of the directional spin wavelet transform."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from spinsdw.coefficients import WaveletCoefficients
+from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.sampling import MW, MWSS
+from spinsdw.spin_transform import SpinHarmonicTransform
+from spinsdw.tiling import ScaleDiscretisedTiling
+from spinsdw.wavelet_transform import SpinWaveletTransform
+from spinsdw.wigner_transform import WignerTransform
+from tests.helpers import (
+    EPS,
+    assert_close,
+    direct_function,
+    direct_map,
+    euler_grid,
+    needs_compiler,
+    random_flm,
+    random_like,
+    random_real_flm,
+    relative_error,
+    wavelet_wigner,
+)
+
+# Small enough to sum directly and to run uncompiled; odd and even N, N > L_j, N = L, every option.
+SMALL = [
+    (1, 0, 1, {}),
+    (2, 0, 2, {}),
+    (3, 2, 1, {}),
+    (8, 0, 1, {}),
+    (8, 0, 2, {"sampling": "mwss"}),
+    (8, 2, 3, {}),
+    (8, -3, 4, {"lowest_scale": 2}),
+    (8, 5, 5, {"sampling": "mwss"}),
+    (8, 2, 8, {}),
+    (7, -1, 7, {"sampling": "mwss"}),
+    (8, 2, 3, {"multiresolution": False}),
+    (8, -2, 2, {"multiresolution": False, "sampling": "mwss", "lowest_scale": 2}),
+    (8, 2, 2, {"dilation": 1.5}),
+    (8, 1, 3, {"dilation": 3, "lowest_scale": 1}),
+    (8, 7, 2, {}),
+    (8, 0, 1, {"real": True}),
+    (8, 0, 4, {"real": True, "sampling": "mwss"}),
+    (8, 0, 8, {"real": True}),
+    (8, 0, 3, {"real": True, "multiresolution": False}),
+]
+LARGE = [
+    (64, spin, directions, {"lowest_scale": lowest_scale})
+    for spin in (0, 2, -3, 5)
+    for directions in (1, 2, 3, 4, 5)
+    for lowest_scale in (0, 2)
+]
+LARGE += [
+    (50, 2, 3, {"dilation": dilation, "sampling": sampling})
+    for dilation in (1.5, 2, 3)
+    for sampling in ("mw", "mwss")
+]
+LARGE += [
+    (65, 2, 20, {}),
+    (33, 0, 33, {}),
+    (33, -4, 33, {"sampling": "mwss", "lowest_scale": 1}),
+    (64, 2, 2, {"multiresolution": False}),
+    (64, -3, 5, {"multiresolution": False, "sampling": "mwss"}),
+    (64, 0, 1, {"real": True}),
+    (64, 0, 4, {"real": True, "sampling": "mwss"}),
+    (64, 0, 5, {"real": True, "multiresolution": False, "lowest_scale": 2}),
+]
+CASES = SMALL + [pytest.param(*case, marks=needs_compiler) for case in LARGE]
+any_case = pytest.mark.parametrize(("bandlimit", "spin", "directions", "options"), CASES)
+small_case = pytest.mark.parametrize(("bandlimit", "spin", "directions", "options"), SMALL)
+
+
+def tolerance(bandlimit):
+    """Ulps of a transform, as for the harmonic one, and a few for the sum over scales."""
+    return 4 * bandlimit + 32
+
+
+def random_signal(transform, **options):
+    if transform.real:
+        return random_real_flm(transform.bandlimit, **options)
+    return random_flm(transform.bandlimit, transform.spin, **options)
+
+
+def random_coefficients(transform, seed=0):
+    """Draw every stored number: what no signal has as its coefficients."""
+    found = transform.analysis_harmonic(np.zeros(transform.bandlimit**2))
+    seeds = iter(range(seed, seed + 100))
+    return found.map(lambda values: random_like(values, seed=next(seeds)))
+
+
+def items(coefficients):
+    yield "scaling", coefficients.scaling
+    for scale in coefficients.scales:
+        yield scale, coefficients[scale]
+
+
+def dot(one, other):
+    return sum(np.vdot(a, b) for (_, a), (_, b) in zip(items(one), items(other), strict=True))
+
+
+def assert_equal(one, other):
+    for (key, a), (_, b) in zip(items(one), items(other), strict=True):
+        assert np.array_equal(a, b), key
+
+
+def assert_all_close(one, other, ulps):
+    """Against the largest value of any scale: scales without signal hold rounding alone."""
+    size = max(np.max(np.abs(values)) for _, values in items(other))
+    for (key, a), (_, b) in zip(items(one), items(other), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=ulps * EPS * size, err_msg=str(key))
+
+
+@any_case
+def test_synthesis_undoes_analysis_in_harmonic_space(bandlimit, spin, directions, options):
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    flm = random_signal(transform)
+    found = transform.synthesis_harmonic(transform.analysis_harmonic(flm))
+    assert_close(found, flm, ulps=tolerance(bandlimit))
+    assert relative_error(found, flm) <= (2 * bandlimit + 8) * EPS
+    assert not np.any(found[: spin**2])
+
+
+@any_case
+def test_synthesis_undoes_analysis_of_maps(bandlimit, spin, directions, options):
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    signal = transform.harmonic.synthesis(random_signal(transform))
+    coefficients = transform.analysis(signal)
+    assert {key: values.shape for key, values in items(coefficients)} == transform.shapes
+    assert all(v.dtype == signal.dtype for _, v in items(coefficients))
+    assert_close(transform.synthesis(coefficients), signal, ulps=2 * tolerance(bandlimit))
+
+
+@small_case
+def test_coefficients_are_the_projections_on_rotated_wavelets(bandlimit, spin, directions, options):
+    """W^j(rho) = <f, R_rho psi^j> = sum_lmn f_lm conj(psi_ln) e^{i m a} d^l_mn(b) e^{i n g}."""
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    flm = random_signal(transform)
+    coefficients = transform.analysis_harmonic(flm)
+    orders = transform.wavelets.directionality.orders
+    for scale in transform.scales:
+        grid = transform.grid_of(transform.bandlimits[scale])
+        angles = euler_grid(grid, transform.orientations)
+        desired = direct_function(wavelet_wigner(flm, transform.wavelets, scale), orders, angles)
+        desired = desired.reshape(directions, *grid.shape)
+        atol = tolerance(bandlimit) * EPS * np.linalg.norm(flm)
+        np.testing.assert_allclose(coefficients[scale], desired, rtol=0, atol=atol)
+
+
+@small_case
+def test_scaling_part_is_a_scalar_map(bandlimit, spin, directions, options):
+    """W^phi_lm = sqrt(4 pi / (2l+1)) f_lm phi_l0, at spin 0 whatever the signal's."""
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    flm = random_signal(transform)
+    el = np.repeat(np.arange(bandlimit), 2 * np.arange(bandlimit) + 1)
+    part = np.sqrt(4 * np.pi / (2 * el + 1)) * flm * transform.wavelets.scaling_harmonics[el]
+    grid = transform.grid_of(transform.tiling.scaling_bandlimit)
+    desired = direct_map(part, 0, grid.colatitudes, grid.longitudes)
+    found = transform.analysis_harmonic(flm).scaling
+    assert_close(found, desired + 0 * found, ulps=tolerance(bandlimit))
+
+
+@any_case
+def test_adjoints_are_those_of_the_plain_dot_product(bandlimit, spin, directions, options):
+    """<A f, w> = <f, A* w> and <S w, f> = <w, S* f>, for any stored numbers w."""
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    flm, noise = random_signal(transform), random_coefficients(transform)
+    signal = transform.harmonic.synthesis(flm)
+    pairs = [
+        (transform.analysis_harmonic(flm), flm, transform.adjoint_analysis_harmonic(noise)),
+        (transform.adjoint_synthesis_harmonic(flm), flm, transform.synthesis_harmonic(noise)),
+        (transform.analysis(signal), signal, transform.adjoint_analysis(noise)),
+        (transform.adjoint_synthesis(signal), signal, transform.synthesis(noise)),
+    ]
+    for coefficients, source, found in pairs:
+        scale = coefficients.norm() * noise.norm()
+        difference = dot(coefficients, noise) - np.vdot(source, found)
+        assert abs(difference) <= tolerance(bandlimit) * EPS * scale
+
+
+@pytest.mark.parametrize("sampling", ["mw", "mwss"])
+@pytest.mark.parametrize("directions", [1, 2, 5, 8])
+def test_real_signals_take_the_same_way(directions, sampling):
+    half, full = (
+        SpinWaveletTransform(12, 0, directions, sampling=sampling, real=real)
+        for real in (True, False)
+    )
+    flm = random_real_flm(12)
+    coefficients = half.analysis_harmonic(flm)
+    assert_all_close(coefficients, full.analysis_harmonic(flm), ulps=tolerance(12))
+    noise = random_coefficients(half)
+    for name in ("synthesis_harmonic", "adjoint_analysis_harmonic"):
+        desired = getattr(full, name)(noise)
+        assert_close(getattr(half, name)(noise), desired, ulps=tolerance(12))
+    desired = full.adjoint_synthesis_harmonic(flm)
+    assert_all_close(half.adjoint_synthesis_harmonic(flm), desired, ulps=tolerance(12))
+
+
+@pytest.mark.parametrize("sampling", ["mw", "mwss"])
+@pytest.mark.parametrize(("spin", "directions"), [(0, 3), (2, 2), (-3, 5)])
+def test_a_scale_on_its_own_grid_holds_what_the_full_grid_holds(spin, directions, sampling):
+    """Both are samples of one function W^j(rho) of bandlimit L_j."""
+    coarse, fine = (
+        SpinWaveletTransform(16, spin, directions, sampling=sampling, multiresolution=multi)
+        for multi in (True, False)
+    )
+    flm = random_flm(16, spin)
+    small, large = coarse.analysis_harmonic(flm), fine.analysis_harmonic(flm)
+    orders = coarse.wavelets.directionality.orders
+    for scale in coarse.scales:
+        bandlimit = coarse.bandlimits[scale]
+        if directions > bandlimit:
+            continue
+        found = WignerTransform(bandlimit, orders, sampling=sampling).analysis(small[scale])
+        desired = WignerTransform(16, orders, sampling=sampling).analysis(large[scale])
+        norm = tolerance(16) * EPS * np.linalg.norm(flm) * 8 * np.pi**2
+        atol = norm
+        np.testing.assert_allclose(found, desired[:, : bandlimit**2], rtol=0, atol=atol)
+        np.testing.assert_allclose(desired[:, bandlimit**2 :], 0, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize(("spin", "directions"), [(0, 1), (2, 3), (-1, 4)])
+def test_energy_of_all_scales_is_that_of_the_signal(spin, directions):
+    """sum |W^phi_lm|^2 + sum_j (2l+1)/(8 pi^2) |W^j_lmn|^2 = sum |f_lm|^2."""
+    transform = SpinWaveletTransform(32, spin, directions, lowest_scale=2)
+    flm = random_flm(32, spin)
+    coefficients = transform.analysis_harmonic(flm)
+    scaling = SpinHarmonicTransform(coefficients.scaling.shape[0]).analysis(coefficients.scaling)
+    energy = np.sum(np.abs(scaling) ** 2)
+    orders = transform.wavelets.directionality.orders
+    for scale, bandlimit in transform.bandlimits.items():
+        found = WignerTransform(bandlimit, orders).analysis(coefficients[scale])
+        el = np.repeat(np.arange(bandlimit), 2 * np.arange(bandlimit) + 1)
+        energy += np.sum((2 * el + 1) / (8 * np.pi**2) * np.abs(found) ** 2)
+    assert_close(energy, np.sum(np.abs(flm) ** 2), ulps=tolerance(32))
+
+
+@small_case
+def test_wavelets_share_out_every_degree(bandlimit, spin, directions, options):
+    """(4 pi/(2l+1)) |phi_l0|^2 + (8 pi^2/(2l+1)) sum_jm |psi^j_lm|^2 = 1, l >= |s|."""
+    transform = SpinWaveletTransform(bandlimit, spin, directions, **options)
+    assert transform.admissibility_error <= 8 * EPS
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, np.pi, -7.3])
+@pytest.mark.parametrize("directions", [1, 2, 3, 6])
+def test_steering_gives_the_coefficients_at_any_angle(directions, angle):
+    """W(g) = sum_k z(g - g_k) W(g_k) equals the direct sum at g."""
+    transform = SpinWaveletTransform(8, 2, directions)
+    flm = random_flm(8, 2)
+    steered = transform.analysis_harmonic(flm).steer(angle)
+    orders = transform.wavelets.directionality.orders
+    for scale in transform.scales:
+        grid = transform.grid_of(transform.bandlimits[scale])
+        angles = euler_grid(grid, np.array([angle]))
+        desired = direct_function(wavelet_wigner(flm, transform.wavelets, scale), orders, angles)
+        atol = tolerance(8) * EPS * np.linalg.norm(flm)
+        np.testing.assert_allclose(
+            steered[scale], desired.reshape(grid.shape), rtol=0, atol=atol, err_msg=str(scale)
+        )
+
+
+@pytest.mark.parametrize("directions", [1, 2, 3, 4, 7])
+def test_half_a_turn_of_a_wavelet_is_a_sign(directions):
+    """W(g + pi) = (-1)^(N-1) W(g)."""
+    coefficients = SpinWaveletTransform(16, -2, directions).analysis_harmonic(random_flm(16, 2))
+    here, there = coefficients.steer(0.3), coefficients.steer(0.3 + np.pi)
+    for scale in coefficients.scales:
+        sign = (-1) ** (directions - 1)
+        assert_close(there[scale], sign * here[scale], ulps=64 * directions)
+
+
+@pytest.mark.parametrize("directions", [1, 2, 3, 4])
+@pytest.mark.parametrize("spin", [0, 2, -3])
+def test_point_inversion_mirrors_positions_and_orientations(spin, directions):
+    """f_lm (-1)^l has W(a, b, g) of f at (a + pi, pi - b, -g)."""
+    transform = SpinWaveletTransform(8, spin, directions, sampling="mwss", multiresolution=False)
+    flm = random_flm(8, spin)
+    signs = np.repeat((-1.0) ** np.arange(8), 2 * np.arange(8) + 1)
+    plain, inverted = (transform.analysis_harmonic(f) for f in (flm, signs * flm))
+    for k, gamma in enumerate(transform.orientations):
+        mirrored = plain.steer(-gamma)
+        for scale in transform.scales:
+            desired = np.roll(mirrored[scale][::-1], 8, axis=-1)
+            assert_close(inverted[scale][k], desired, ulps=16 * tolerance(8))
+
+
+@pytest.mark.parametrize("directions", [1, 2, 3, 4])
+def test_real_signals_have_real_coefficients(directions):
+    """Spin 0: the wavelets are real whether N is odd or even."""
+    coefficients = SpinWaveletTransform(16, 0, directions).analysis_harmonic(random_real_flm(16))
+    for _, values in items(coefficients):
+        assert np.max(np.abs(values.imag)) <= tolerance(16) * EPS * np.max(np.abs(values))
+
+
+@pytest.mark.parametrize("sampling", ["mw", "mwss"])
+@pytest.mark.parametrize(("spin", "directions"), [(0, 2), (2, 3)])
+def test_rotation_about_the_pole_shifts_positions(spin, directions, sampling):
+    """f(theta, phi - a) has W^j(alpha - a, beta, gamma), for a step a of any scale's grid."""
+    transform = SpinWaveletTransform(16, spin, directions, sampling=sampling)
+    flm = random_flm(16, spin)
+    m = np.concatenate([np.arange(-el, el + 1) for el in range(16)])
+    plain = transform.analysis_harmonic(flm)
+    for scale, bandlimit in transform.bandlimits.items():
+        step = transform.grid_of(bandlimit).longitudes[3 % plain[scale].shape[-1]]
+        turned = transform.analysis_harmonic(flm * np.exp(-1j * m * step))
+        desired = np.roll(plain[scale], 3, axis=-1)
+        assert_close(turned[scale], desired, ulps=16 * tolerance(16))
+
+
+@pytest.mark.parametrize(("spin", "directions"), [(0, 2), (2, 3), (-3, 4)])
+def test_any_rotation_moves_position_and_orientation(spin, directions):
+    """<R f, R_rho psi> = <f, R^-1 R_rho psi>: the coefficients of the turned signal at rho."""
+    spherical = pytest.importorskip("spherical")
+    quaternionic = pytest.importorskip("quaternionic")
+    bandlimit = 6
+    flm = random_flm(bandlimit, spin)
+    turn = quaternionic.array.from_euler_angles(0.7, 1.2, -0.4)
+    wigner = spherical.Wigner(bandlimit - 1)
+    # (R f)_lm = sum_n D^l_mn(R) f_ln; that package's D is the conjugate of ours.
+    matrix, turned = wigner.D(turn).conj(), np.zeros_like(flm)
+    for el in range(bandlimit):
+        for m in range(-el, el + 1):
+            first = wigner.Dindex(el, m, -el)
+            row = matrix[first : first + 2 * el + 1]
+            turned[el * el + el + m] = row @ flm[el**2 : (el + 1) ** 2]
+    transform = SpinWaveletTransform(bandlimit, spin, directions)
+    coefficients = transform.analysis_harmonic(turned)
+    orders = transform.wavelets.directionality.orders
+    for scale, size in transform.bandlimits.items():
+        angles = euler_grid(transform.grid_of(size), transform.orientations)
+        points = quaternionic.array(
+            [quaternionic.array.from_euler_angles(*a) for a in zip(*angles, strict=True)]
+        )
+        moved = np.moveaxis((turn.inverse * points).to_euler_angles, -1, 0)
+        desired = direct_function(wavelet_wigner(flm, transform.wavelets, scale), orders, moved)
+        found = coefficients[scale].ravel()
+        # Angles recovered near a pole are good to the root of eps, in sums of them better.
+        np.testing.assert_allclose(found, desired, rtol=0, atol=1e-12 * np.linalg.norm(flm))
+
+
+@pytest.mark.parametrize("part", ["scaling", 0, 3, 4])
+def test_parts_of_a_synthesis_add_up(part):
+    """Synthesis of some parts is that of coefficients zero in the others."""
+    transform = SpinWaveletTransform(16, 2, 3)
+    coefficients = transform.analysis_harmonic(random_flm(16, 2))
+    others = {"scaling", *transform.scales} - {part}
+    alone = transform.synthesis_harmonic(coefficients, parts=[part])
+    rest = transform.synthesis_harmonic(coefficients, parts=others)
+    zeroed = transform.synthesis_harmonic(coefficients * dict.fromkeys(others, 0.0))
+    assert_close(alone, zeroed, ulps=0)
+    assert_close(alone + rest, transform.synthesis_harmonic(coefficients), ulps=8)
+    assert not np.any(transform.synthesis_harmonic(coefficients, parts=()))
+
+
+@pytest.mark.parametrize("part", ["wavelets", 99, -1, None])
+def test_parts_are_those_of_the_transform(part):
+    transform = SpinWaveletTransform(8)
+    coefficients = transform.analysis_harmonic(random_flm(8))
+    with pytest.raises(ParameterError, match=r"must be among 'scaling' and the scales \(0, 1, 2"):
+        transform.synthesis_harmonic(coefficients, parts=[part])
+
+
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("batch", [(3,), (2, 2), (1,), (0,)])
+def test_leading_axes_are_a_batch(batch, real):
+    transform = SpinWaveletTransform(8, 0 if real else 2, 3, real=real)
+    flm = random_signal(transform, batch=batch)
+    coefficients = transform.analysis_harmonic(flm)
+    for key, values in items(coefficients):
+        assert values.shape == (*batch, *transform.shapes[key])
+    back = transform.synthesis_harmonic(coefficients)
+    assert back.shape == flm.shape
+    assert transform.analysis(transform.harmonic.synthesis(flm)).shapes == coefficients.shapes
+    for place in np.ndindex(*batch):
+        alone = transform.analysis_harmonic(flm[place])
+        for key, values in items(alone):
+            stored = coefficients.scaling if key == "scaling" else coefficients[key]
+            assert np.array_equal(stored[place], values)
+        assert np.array_equal(back[place], transform.synthesis_harmonic(alone))
+
+
+@pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])
+def test_results_have_the_same_bits_on_any_number_of_threads(spin, real):
+    flm = None
+    for threads in (1, 2, 3, 5):
+        transform = SpinWaveletTransform(40, spin, 3, real=real, threads=threads)
+        if flm is None:
+            flm = random_signal(transform)
+            noise = random_coefficients(transform)
+            first = transform
+        for name in ("analysis_harmonic", "adjoint_synthesis_harmonic"):
+            assert_equal(getattr(transform, name)(flm), getattr(first, name)(flm))
+        for name in ("synthesis_harmonic", "adjoint_analysis_harmonic"):
+            assert np.array_equal(getattr(transform, name)(noise), getattr(first, name)(noise))
+
+
+def test_one_transform_serves_many_threads():
+    transform = SpinWaveletTransform(24, 2, 3, threads=2)
+    signals = random_flm(24, 2, batch=(6,))
+
+    def work(flm):
+        return transform.synthesis_harmonic(transform.analysis_harmonic(flm))
+
+    alone = [work(flm) for flm in signals]
+    with ThreadPoolExecutor(3) as pool:
+        assert np.array_equal(alone, list(pool.map(work, signals)))
+
+
+def test_inputs_are_left_alone():
+    transform = SpinWaveletTransform(8, 2, 2)
+    flm = random_flm(8)
+    before = flm.copy()
+    flm.flags.writeable = False
+    coefficients = transform.analysis_harmonic(flm)
+    kept = coefficients.copy()
+    transform.synthesis_harmonic(coefficients)
+    transform.adjoint_analysis_harmonic(coefficients)
+    assert np.array_equal(flm, before)
+    assert_equal(coefficients, kept)
+
+
+def test_degrees_below_the_spin_do_not_contribute():
+    transform = SpinWaveletTransform(8, 3, 2)
+    flm = random_flm(8)
+    cleared = flm.copy()
+    cleared[:9] = 0
+    assert_equal(transform.analysis_harmonic(flm), transform.analysis_harmonic(cleared))
+
+
+def test_dtypes_and_layouts_do_not_matter():
+    transform = SpinWaveletTransform(8, 2, 2)
+    signal = random_like(np.empty((15, 8)), seed=3).astype(">f4").T
+    plain = np.ascontiguousarray(signal, dtype=complex)
+    assert_equal(transform.analysis(signal), transform.analysis(plain))
+
+
+@pytest.mark.slow
+@needs_compiler
+@pytest.mark.parametrize(("bandlimit", "directions"), [(1024, 3), (2048, 1)])
+def test_synthesis_undoes_analysis_at_high_degree(bandlimit, directions):
+    transform = SpinWaveletTransform(bandlimit, 2, directions)
+    flm = random_flm(bandlimit, 2)
+    found = transform.synthesis_harmonic(transform.analysis_harmonic(flm))
+    assert relative_error(found, flm) <= bandlimit * EPS
+    assert np.max(np.abs(found - flm)) < 1e-11
+
+
+def test_objects_describe_themselves_and_are_frozen():
+    transform = SpinWaveletTransform(np.int64(16), 2, 3, lowest_scale=1, sampling="mwss")
+    assert type(transform.bandlimit) is int
+    assert transform.sampling == MWSS(16)
+    assert transform.scales == (1, 2, 3, 4)
+    assert transform.bandlimits == {1: 4, 2: 8, 3: 16, 4: 16}
+    assert transform.shapes["scaling"] == (3, 4)
+    assert transform.shapes[2] == (3, 9, 16)
+    assert_close(transform.orientations, np.arange(3) * np.pi / 3, ulps=1)
+    with pytest.raises(FrozenInstanceError):
+        transform.spin = 0
+
+
+def test_coefficients_know_what_made_them():
+    transform = SpinWaveletTransform(16, 2, 3, dilation=3, lowest_scale=1, sampling="mwss")
+    found = transform.analysis_harmonic(random_flm(16)).parameters
+    assert found == {
+        "bandlimit": 16,
+        "spin": 2,
+        "directions": 3,
+        "dilation": 3.0,
+        "lowest_scale": 1,
+        "sampling": "mwss",
+        "multiresolution": True,
+        "real": False,
+    }
+
+
+def test_tiling_may_be_given():
+    tiling = ScaleDiscretisedTiling(16, dilation=3.0, lowest_scale=1)
+    given = SpinWaveletTransform(16, 2, 3, tiling=tiling)
+    named = SpinWaveletTransform(16, 2, 3, dilation=3.0, lowest_scale=1)
+    flm = random_flm(16, 2)
+    assert_equal(given.analysis_harmonic(flm), named.analysis_harmonic(flm))
+    assert (given.dilation, given.lowest_scale) == (3.0, 1)
+
+
+def test_tiling_of_another_bandlimit_is_refused():
+    with pytest.raises(ParameterError, match="tiling has bandlimit 8 but the transform has 16"):
+        SpinWaveletTransform(16, tiling=ScaleDiscretisedTiling(8))
+
+
+@pytest.mark.parametrize("bandlimit", [0, -1, 2.5, True, "8", None])
+def test_bandlimit_is_a_positive_integer(bandlimit):
+    with pytest.raises(ParameterError, match=r"bandlimit=.* must be an integer of at least 1"):
+        SpinWaveletTransform(bandlimit)
+
+
+@pytest.mark.parametrize("spin", [8, -8, 1.0, True, "2", None])
+def test_spin_is_an_integer_below_the_bandlimit(spin):
+    with pytest.raises(ParameterError, match=r"spin=.* must be"):
+        SpinWaveletTransform(8, spin)
+
+
+@pytest.mark.parametrize("directions", [0, -1, 9, 2.0, True, "2", None])
+def test_directions_are_an_integer_up_to_the_bandlimit(directions):
+    with pytest.raises(ParameterError, match=r"directions=.* must"):
+        SpinWaveletTransform(8, 0, directions)
+
+
+@pytest.mark.parametrize("dilation", [1, 0.5, -2, np.nan, np.inf, "2", None, True])
+def test_dilation_exceeds_one(dilation):
+    with pytest.raises(ParameterError, match=r"dilation=.* must"):
+        SpinWaveletTransform(8, dilation=dilation)
+
+
+@pytest.mark.parametrize("lowest_scale", [-1, 1.5, True, "0", None, 20])
+def test_lowest_scale_is_an_integer_with_a_scale_above(lowest_scale):
+    with pytest.raises(ParameterError, match=r"lowest_scale=.* must"):
+        SpinWaveletTransform(8, lowest_scale=lowest_scale)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+def test_threads_are_a_positive_integer(threads):
+    with pytest.raises(ParameterError, match=r"threads=.* must be a positive integer, or None"):
+        SpinWaveletTransform(8, threads=threads)
+
+
+def test_signals_with_spin_are_not_real():
+    with pytest.raises(ParameterError, match="real=True needs spin 0, not spin=2"):
+        SpinWaveletTransform(8, 2, real=True)
+
+
+@pytest.mark.parametrize("sampling", ["gl", 3, MW(9)])
+def test_sampling_is_known_and_has_the_same_bandlimit(sampling):
+    with pytest.raises(ParameterError, match="sampling"):
+        SpinWaveletTransform(8, sampling=sampling)
+
+
+@pytest.mark.parametrize("name", ["analysis_harmonic", "adjoint_synthesis_harmonic"])
+@pytest.mark.parametrize(
+    ("flm", "error", "message"),
+    [
+        (np.zeros(63), ShapeError, r"bandlimit\*\*2 = 64 long"),
+        (np.full(64, "a"), DataError, "must hold numbers"),
+        (np.full(64, None), DataError, "dtype object"),
+        (np.full(64, np.nan), DataError, "NaN or infinite"),
+    ],
+)
+@pytest.mark.parametrize("spin", [0, 2])
+def test_coefficients_that_cannot_be_used_are_refused(name, flm, error, message, spin):
+    with pytest.raises(error, match=message):
+        getattr(SpinWaveletTransform(8, spin), name)(flm)
+
+
+@pytest.mark.parametrize("name", ["analysis", "adjoint_synthesis"])
+@pytest.mark.parametrize(
+    ("values", "error", "message"),
+    [
+        (np.zeros((15, 8)), ShapeError, r"shape \(15, 8\); it must be \(\.\.\., 8, 15\)"),
+        (np.full((8, 15), None), DataError, "dtype object"),
+        (np.full((8, 15), np.nan), DataError, "120 values that are not finite"),
+        (np.zeros((8, 15), dtype=complex), DataError, "complex but real=True was asked for"),
+    ],
+)
+def test_maps_that_cannot_be_used_are_refused(name, values, error, message):
+    with pytest.raises(error, match=message):
+        getattr(SpinWaveletTransform(8, real=True), name)(values)
+
+
+SYNTHESES = ["synthesis", "synthesis_harmonic", "adjoint_analysis", "adjoint_analysis_harmonic"]
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+@pytest.mark.parametrize("value", [None, np.zeros(64), {"scaling": 0}])
+def test_synthesis_takes_coefficients_alone(name, value):
+    with pytest.raises(ParameterError, match="pass the WaveletCoefficients that analysis returns"):
+        getattr(SpinWaveletTransform(8), name)(value)
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ((16,), {}, r"have scales \(0, 1, 2, 3, 4\) but the transform has \(0, 1, 2, 3\)"),
+        ((8,), {"lowest_scale": 1}, r"have scales \(1, 2, 3\)"),
+        ((8, 0, 2), {}, "scale 0 has shape"),
+        ((8,), {"sampling": "mwss"}, "scaling part has shape"),
+        ((8,), {"multiresolution": False}, "scaling part has shape"),
+    ],
+)
+def test_coefficients_of_another_shape_are_refused(name, arguments, options, message):
+    other = SpinWaveletTransform(*arguments, **options)
+    coefficients = other.analysis_harmonic(np.zeros(other.bandlimit**2))
+    with pytest.raises(ShapeError, match=message):
+        getattr(SpinWaveletTransform(8), name)(coefficients)
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+def test_coefficients_that_are_not_finite_are_refused(name):
+    transform = SpinWaveletTransform(8)
+    coefficients = transform.analysis_harmonic(random_flm(8))
+    wavelets = {j: coefficients[j].copy() for j in coefficients.scales}
+    wavelets[2][0, 1, 1] = np.nan
+    broken = WaveletCoefficients(coefficients.scaling, wavelets, coefficients.parameters)
+    with pytest.raises(DataError, match="scale 2 has 1 values that are not finite"):
+        getattr(transform, name)(broken)
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+def test_complex_coefficients_are_not_real(name):
+    coefficients = SpinWaveletTransform(8).analysis_harmonic(random_flm(8))
+    with pytest.raises(DataError, match="scaling part is complex but real=True was asked for"):
+        getattr(SpinWaveletTransform(8, real=True), name)(coefficients)
