@@ -198,7 +198,7 @@ class WaveletCoefficients:
                 msg = f"factors for {sorted(map(str, unknown))} match no scale of {self.scales}."
                 raise ParameterError(msg)
             return self._with(lambda key, values: values * np.asarray(factor.get(key, 1.0)))
-        if not np.isscalar(factor) and np.ndim(factor) != 0:  # type: ignore[arg-type]
+        if np.ndim(factor) != 0:
             return NotImplemented
         return self._with(lambda _, values: values * factor)
 

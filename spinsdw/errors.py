@@ -7,7 +7,7 @@ class                       also a               raised when
 `ShapeError`                ValueError           an array has another shape than the object needs
 `DataError`                 ValueError           values are unusable: NaN, wrong dtype, out of range
 `FileFormatError`           ValueError           a file is unreadable, truncated or not what it says
-`OutputExistsError`         FileExistsError      an output is there and overwriting was not asked for
+`OutputExistsError`         FileExistsError      an output exists and overwriting was not asked for
 `MemoryBudgetError`         MemoryError          a stated memory budget would be exceeded
 `MissingPackageError`       ImportError          an optional package is not installed
 `PrecisionWarning`          UserWarning          a result is less accurate than the user may expect

@@ -1,4 +1,8 @@
-"""Fourier transforms along rings: the only file that knows the FFT library."""
+"""Fourier transforms: the only file that knows the FFT library.
+
+Maps are [..., ring, phi], Fourier columns [..., m, ring], m counted modulo the number of points, or
+m = 0 .. P // 2 for real maps. The change of layout is part of the transform.
+"""
 
 from __future__ import annotations
 
@@ -6,41 +10,49 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["from_half_series", "from_series", "to_half_series", "to_series"]
+__all__ = ["fill_maps", "fill_maps_columns", "from_series", "to_series"]
 
 Array = np.ndarray[Any, Any]
 
 
 def from_series(series: Array, out: Array) -> None:
-    """Fill ``out[..., p] = sum_m series[..., m] exp(2 pi i m p / P)``, m counted modulo P."""
-    import ducc0
+    """Fill ``out[..., p] = sum_m series[..., m] exp(2 pi i m p / P)``.
 
-    ducc0.fft.c2c(series, axes=(series.ndim - 1,), forward=False, out=out, nthreads=1)
+    For a real ``out`` the series holds m = 0 .. P // 2.
+    """
+    _backward(series, out, series.ndim - 1)
 
 
 def to_series(values: Array, out: Array) -> None:
-    """Fill ``out[..., m] = sum_p values[..., p] exp(-2 pi i m p / P)``."""
+    """Fill ``out[..., m] = sum_p values[..., p] exp(-2 pi i m p / P)``, the adjoint.
+
+    For real ``values`` it fills m = 0 .. P // 2.
+    """
+    _forward(values, out, values.ndim - 1)
+
+
+def fill_maps(columns: Array, maps: Array) -> None:
+    """Fill ``maps[..., ring, p] = sum_m columns[..., m, ring] exp(2 pi i m p / P)``."""
+    _backward(columns, np.swapaxes(maps, -1, -2), columns.ndim - 2)
+
+
+def fill_maps_columns(maps: Array, columns: Array) -> None:
+    """Fill ``columns[..., m, ring] = sum_p maps[..., ring, p] exp(-2 pi i m p / P)``."""
+    _forward(np.swapaxes(maps, -1, -2), columns, maps.ndim - 2)
+
+
+def _backward(series: Array, out: Array, axis: int) -> None:
     import ducc0
 
-    ducc0.fft.c2c(values, axes=(values.ndim - 1,), forward=True, out=out, nthreads=1)
+    if np.iscomplexobj(out):
+        ducc0.fft.c2c(series, axes=(axis,), forward=False, out=out, nthreads=1)
+    else:
+        size = out.shape[axis]
+        ducc0.fft.c2r(series, axes=(axis,), forward=False, lastsize=size, out=out, nthreads=1)
 
 
-def from_half_series(series: Array, out: Array) -> None:
-    """As `from_series` for real ``out``: ``series`` holds m = 0 .. P // 2."""
+def _forward(values: Array, out: Array, axis: int) -> None:
     import ducc0
 
-    ducc0.fft.c2r(
-        series,
-        axes=(series.ndim - 1,),
-        forward=False,
-        lastsize=out.shape[-1],
-        out=out,
-        nthreads=1,
-    )
-
-
-def to_half_series(values: Array, out: Array) -> None:
-    """As `to_series` for real ``values``: ``out`` holds m = 0 .. P // 2."""
-    import ducc0
-
-    ducc0.fft.r2c(values, axes=(values.ndim - 1,), forward=True, out=out, nthreads=1)
+    transform = ducc0.fft.c2c if np.iscomplexobj(values) else ducc0.fft.r2c
+    transform(values, axes=(axis,), forward=True, out=out, nthreads=1)

@@ -9,22 +9,25 @@ into orientations) are this one sum; the transforms differ in weights and mixing
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from spinsdw.fourier import from_half_series, from_series, to_half_series, to_series
+from spinsdw.fourier import fill_maps, fill_maps_columns
 from spinsdw.parallel import run_tasks
-from spinsdw.ring_engine import RingEngine
+from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
 
 __all__ = ["GridSums", "fill_negative_orders"]
 
 Array = np.ndarray[Any, Any]
 
-# Bytes of the rings one task transforms: small enough for a core's second-level cache.
+# Bytes of the rings one task transforms: small enough for a core's second-level cache, but never
+# so few rings that columns are read in pieces shorter than a few cache lines.
 _TASK_BYTES = 2**19
+_FEWEST_RINGS = 16
 
 
 @functools.lru_cache(maxsize=64)
@@ -66,51 +69,38 @@ class GridSums:
     threads: int
 
     @property
-    def _sides(self) -> int:
-        return 1 if self.real else 2
-
-    @property
     def _n_m(self) -> int:
         n_phi = self.sampling.n_phi
         return n_phi // 2 + 1 if self.real else n_phi
 
-    def _ring_tasks(self, call: Any, outputs: int) -> None:
-        n_rings = self.sampling.n_rings
-        step = max(1, _TASK_BYTES // (16 * self.sampling.n_phi * outputs))
-        run_tasks(
-            [
-                functools.partial(call, first, min(first + step, n_rings))
-                for first in range(0, n_rings, step)
-            ],
-            self.threads,
-        )
+    def _order_sums(self, weights: Array, lowest: int) -> OrderSums:
+        return OrderSums(self.orders, weights, lowest, 1 if self.real else 2, self.threads)
 
-    def _clear_unused(self, spectra: Array) -> None:
+    def _columns(self) -> Array:
+        """Return room for the Fourier columns of all outputs."""
+        rows = max(self.mixing.shape)
+        shape = (rows, self._n_m, self.sampling.n_rings)
+        columns = np.empty(shape, dtype=np.complex128)
         # MWSS has one more Fourier mode, |m| = L, than a band-limited signal.
         if self.sampling.n_phi == 2 * self.sampling.bandlimit:
-            spectra[..., self.sampling.bandlimit] = 0.0
+            columns[:, self.sampling.bandlimit] = 0.0
+        return columns
 
-    def _fill_spectra(self, flm: Array, weights: Array, mixing: Array, lowest: int) -> Array:
-        shape = (mixing.shape[0], self.sampling.n_rings, self._n_m)
-        spectra = np.empty(shape, dtype=np.complex128)
-        self._clear_unused(spectra)
-        _engine(self.sampling).fill_spectra(
-            flm,
-            weights,
-            orders=self.orders,
-            mixing=mixing,
-            lowest=lowest,
-            sides=self._sides,
-            out=spectra,
-            threads=self.threads,
-        )
-        return spectra
+    def _share(self, call: Callable[[int, int], None], size: int, step: int) -> None:
+        tasks = [
+            functools.partial(call, first, min(first + step, size))
+            for first in range(0, size, step)
+        ]
+        run_tasks(tasks, self.threads)
 
-    def _weigh_spectra(self, spectra: Array) -> Array:
-        columns = np.ascontiguousarray(spectra.transpose(0, 2, 1))
-        self.sampling.weigh_columns(columns, self.orders, threads=self.threads)
-        mixed = np.tensordot(self.mixing, columns, axes=(1, 0))
-        return np.ascontiguousarray(mixed.transpose(0, 2, 1))
+    def _share_rings(self, call: Callable[[int, int], None], outputs: int) -> None:
+        step = max(_FEWEST_RINGS, _TASK_BYTES // (16 * self.sampling.n_phi * outputs))
+        self._share(call, self.sampling.n_rings, step)
+
+    def _mix(self, mixing: Array, columns: Array) -> None:
+        from spinsdw.compiled.columns import mix_columns
+
+        self._share(lambda a, b: mix_columns(mixing, a, b, columns), self._n_m, 32)
 
     def to_grid(
         self, flm: Array, weights: Array, *, lowest: int = 0, quadrature: bool = False
@@ -120,40 +110,21 @@ class GridSums:
         ``weights``: (orders, L) complex. With ``quadrature`` the grid's quadrature is applied to
         the columns of every order first: that is the adjoint of an analysis.
         """
+        columns = self._columns()
+        engine, sums = _engine(self.sampling), self._order_sums(weights, lowest)
         if quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
-            spectra = self._weigh_spectra(self._fill_spectra(flm, weights, identity, lowest))
+            engine.fill_columns(flm, sums, identity, columns)
+            self.sampling.weigh_columns(columns, self.orders, mixing=identity, threads=self.threads)
+            self._mix(self.mixing, columns)
         else:
-            spectra = self._fill_spectra(flm, weights, self.mixing, lowest)
-        if not self.real:
-            self._ring_tasks(
-                lambda a, b: from_series(spectra[:, a:b], spectra[:, a:b]), spectra.shape[0]
-            )
-            return spectra
-        maps = np.empty((spectra.shape[0], *self.sampling.shape))
-        self._ring_tasks(
-            lambda a, b: from_half_series(spectra[:, a:b], maps[:, a:b]), spectra.shape[0]
+            engine.fill_columns(flm, sums, self.mixing, columns)
+        outputs = self.mixing.shape[0]
+        maps = np.empty(
+            (outputs, *self.sampling.shape), dtype=np.float64 if self.real else np.complex128
         )
+        self._share_rings(lambda a, b: fill_maps(columns[:outputs, :, a:b], maps[:, a:b]), outputs)
         return maps
-
-    def _columns(self, maps: Array) -> Array:
-        """Fourier columns of each order: (orders, m, rings)."""
-        from spinsdw.compiled.columns import fill_columns
-
-        columns = np.empty(
-            (len(self.orders), self._n_m, self.sampling.n_rings), dtype=np.complex128
-        )
-        unmixing = np.ascontiguousarray(self.mixing.conj().T)
-        transform = to_half_series if self.real else to_series
-
-        def task(first: int, stop: int) -> None:
-            shape = (maps.shape[0], stop - first, self._n_m)
-            series = np.empty(shape, dtype=np.complex128)
-            transform(maps[:, first:stop], series)
-            fill_columns(series, unmixing, first, columns)
-
-        self._ring_tasks(task, maps.shape[0])
-        return columns
 
     def from_grid(
         self,
@@ -168,15 +139,14 @@ class GridSums:
 
         With ``quadrature`` the sum over rings becomes the exact integral over the sphere.
         """
-        columns = self._columns(maps)
-        if quadrature:
-            self.sampling.weigh_columns(columns, self.orders, threads=self.threads)
-        _engine(self.sampling).add_to_harmonics(
-            columns,
-            weights,
-            orders=self.orders,
-            lowest=lowest,
-            sides=self._sides,
-            out=out,
-            threads=self.threads,
+        columns = self._columns()
+        self._share_rings(
+            lambda a, b: fill_maps_columns(maps[:, a:b], columns[: maps.shape[0], :, a:b]),
+            maps.shape[0],
         )
+        unmixing = np.ascontiguousarray(self.mixing.conj().T)
+        if quadrature:
+            self.sampling.weigh_columns(columns, self.orders, mixing=unmixing, threads=self.threads)
+        elif not np.array_equal(unmixing, [[1.0]]):
+            self._mix(unmixing, columns)
+        _engine(self.sampling).add_to_harmonics(columns, self._order_sums(weights, lowest), out)

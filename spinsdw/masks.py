@@ -237,7 +237,8 @@ def taper(depth: ArrayLike) -> FloatArray:
     >>> taper([-1.0, 0.5, 2.0])
     array([0. , 0.5, 1. ])
     """
-    x = np.clip(np.asarray(depth, dtype=np.float64), 0, 1)
+    # Adding 0.0 turns -0.0 into 0.0: 1 / -0.0 would be the wrong infinity.
+    x = np.clip(np.asarray(depth, dtype=np.float64), 0, 1) + 0.0
     with np.errstate(divide="ignore", over="ignore"):
         # Minus infinity at x = 0 and infinity at 1, where tanh takes its limits.
         steepness = 1 / (1 - x) - 1 / x
@@ -261,7 +262,7 @@ def apodise(mask: ArrayLike, width: float, *, profile: str = "smooth") -> FloatA
     ========  ==================================  ==========================================
     profile   f(x) for 0 <= x <= 1                also called
     ========  ==================================  ==========================================
-    smooth    `taper`, all derivatives continuous
+    smooth    `taper`, in closed form             all derivatives are continuous
     C1        x - sin(2 pi x) / (2 pi)            "C1" in NaMaster, C2 in Grain et al. 2009
     C2        (1 - cos(pi x)) / 2                 "C2" in NaMaster, C1 in Grain et al. 2009
     ========  ==================================  ==========================================

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
@@ -12,7 +11,7 @@ import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import DataError, ParameterError, ShapeError
-from spinsdw.harmonics import multiply_by_degree, polarisation_factor
+from spinsdw.harmonics import check_bandlimit, multiply_by_degree, polarisation_factor
 from spinsdw.healpix import (
     HealpixFit,
     check_mask,
@@ -20,7 +19,6 @@ from spinsdw.healpix import (
     nested_to_ring,
     ring_to_nested,
 )
-from spinsdw.sampling.base import check_bandlimit
 from spinsdw.separation.pseudo import PseudoMethod
 from spinsdw.separation.report import Clock, check_choice
 from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
@@ -174,7 +172,7 @@ class EBSeparator:
         if not 0 < taper <= 1:
             msg = f"taper={taper} must be a share of energy in (0, 1]; 0.2 suits most masks."
             raise ParameterError(msg)
-        sky, weights = None, None
+        weights = None
         if mask is not None:
             values = np.asarray(mask)
             sky = sky_of(values, bandlimit, name="mask", threads=threads)
@@ -189,10 +187,9 @@ class EBSeparator:
                 ScaleDiscretisedTiling(bandlimit, dilation=dilation).highest_scale,
             )
         settings = (bandlimit, weights, method, directions, dilation, lowest_scale)
-        values = (*settings, float(taper), output, bool(nest), threads)
-        for item, value in zip(fields(self), values, strict=True):
+        parameters = (*settings, float(taper), output, bool(nest), threads)
+        for item, value in zip(fields(self), parameters, strict=True):
             object.__setattr__(self, item.name, value)
-        object.__setattr__(self, "_sky", sky)
         # Checks directions, dilation, lowest_scale and threads now rather than at the first map.
         self._transform("mw")
 
@@ -213,10 +210,9 @@ class EBSeparator:
         return _METHODS[self.method](transform, sky, self.mask, self.taper)
 
     def _sky_of(self, q: Array) -> HealpixSky | GridSky:
-        mask_sky: HealpixSky | GridSky | None = self._sky  # type: ignore[attr-defined]
         sky = sky_of(q, self.bandlimit, name="q", threads=self.threads)
-        if mask_sky is not None and (self.mask is None or q.shape != self.mask.shape):
-            msg = f"q has shape {q.shape} but the mask {np.shape(self.mask)}; they must be alike."
+        if self.mask is not None and q.shape != self.mask.shape:
+            msg = f"q has shape {q.shape} but the mask {self.mask.shape}; they must be alike."
             raise ShapeError(msg)
         return sky
 

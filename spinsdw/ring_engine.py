@@ -8,6 +8,7 @@ them for one bandlimit and one set of colatitudes, and shares the work among thr
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from spinsdw.parallel import run_tasks
 
-__all__ = ["RingEngine", "make_runs"]
+__all__ = ["OrderSums", "RingEngine", "make_runs"]
 
 Array = np.ndarray[Any, Any]
 
@@ -74,6 +75,31 @@ def _largest_order(sine: Array, bandlimit: int) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class OrderSums:
+    """What is summed: sum_l weights[i, l] f_lm d^l_{m, n_i}(theta) for each order n_i.
+
+    Parameters
+    ----------
+    orders : tuple of int
+        The orders n_i.
+    weights : ndarray, shape (orders, L), complex128
+        A factor for each order and degree.
+    lowest : int
+        Degrees below it have weight zero, and are skipped.
+    sides : int
+        2 for +-m, 1 for m >= 0 only.
+    threads : int
+        Threads to share the work.
+    """
+
+    orders: tuple[int, ...]
+    weights: Array
+    lowest: int = 0
+    sides: int = 2
+    threads: int = 1
+
+
+@dataclass(frozen=True, eq=False)
 class RingEngine:
     """Sums over d^l_mn(theta) at fixed colatitudes.
 
@@ -111,15 +137,15 @@ class RingEngine:
         return tuple(np.concatenate([v, np.full(padding, fill)]) for v, fill in columns)
 
     @functools.cached_property
-    def _rings(self) -> dict[str, tuple[Array, ...]]:
-        from spinsdw.compiled.vectors import ADJOINT_RINGS, RINGS
+    def _rings(self) -> tuple[Array, ...]:
+        from spinsdw.compiled.vectors import RINGS
 
-        return {"sum": self._padded_rings(RINGS), "adjoint": self._padded_rings(ADJOINT_RINGS)}
+        return self._padded_rings(RINGS)
 
     @functools.lru_cache(maxsize=32)  # noqa: B019 - engines are few and shared
     def _windows(self, largest_order: int) -> Array:
         """For each m the first and one past the last ring that matter at |n| <= largest_order."""
-        sine = self._rings["sum"][0][: self.colatitudes.size]
+        sine = self._rings[0][: self.colatitudes.size]
         reach = _largest_order(sine, self.bandlimit) + largest_order
         m = np.arange(self.bandlimit)
         north = np.maximum.accumulate(reach)
@@ -128,57 +154,68 @@ class RingEngine:
         high = sine.size - np.searchsorted(south, m)
         return np.stack([np.minimum(low, sine.size), np.maximum(high, 0)]).astype(np.int64)
 
-    def _ranges(self, threads: int) -> list[tuple[int, int]]:
+    def _geometry(self, sums: OrderSums) -> tuple[Any, ...]:
+        runs = make_runs(sums.orders, symmetric=self.symmetric, sides=sums.sides)
+        windows = self._windows(max(abs(n) for n in sums.orders))
+        return runs, windows
+
+    def _share(self, call: Callable[[int, int], None], threads: int) -> None:
         from spinsdw.compiled.order_sums import M_CHUNK
 
         step = self.bandlimit if threads == 1 else M_CHUNK
-        return [(m, min(m + step, self.bandlimit)) for m in range(0, self.bandlimit, step)]
+        run_tasks(
+            [
+                functools.partial(call, m, min(m + step, self.bandlimit))
+                for m in range(0, self.bandlimit, step)
+            ],
+            threads,
+        )
 
-    def fill_spectra(
-        self,
-        flm: Array,
-        weights: Array,
-        *,
-        orders: tuple[int, ...],
-        mixing: Array,
-        lowest: int,
-        sides: int = 2,
-        out: Array,
-        threads: int,
-    ) -> None:
-        """Fill ``out[k, ring, m]``; shapes as in `compiled.order_sums.fill_ring_spectra`."""
-        from spinsdw.compiled.order_sums import fill_ring_spectra
+    def fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> None:
+        """Fill ``out[k, m, ring]``; shapes as in `compiled.order_sums.fill_columns`."""
+        from spinsdw.compiled.order_sums import fill_columns
 
-        runs = make_runs(orders, symmetric=self.symmetric, sides=sides)
-        windows = self._windows(max(abs(n) for n in orders))
-        rings, tables = self._rings["sum"], self._tables
-        arguments = (self.bandlimit, lowest, sides, flm, weights, runs, mixing, rings, windows, tables)
-        tasks = [
-            functools.partial(fill_ring_spectra, first, stop, *arguments, out)
-            for first, stop in self._ranges(threads)
-        ]
-        run_tasks(tasks, threads)
+        runs, windows = self._geometry(sums)
 
-    def add_to_harmonics(
-        self,
-        spectra: Array,
-        weights: Array,
-        *,
-        orders: tuple[int, ...],
-        lowest: int,
-        sides: int = 2,
-        out: Array,
-        threads: int,
-    ) -> None:
-        """Add to ``out``; shapes as in `compiled.order_sums.add_spectra_to_harmonics`."""
-        from spinsdw.compiled.order_sums import add_spectra_to_harmonics
+        def task(first: int, stop: int) -> None:
+            fill_columns(
+                first,
+                stop,
+                self.bandlimit,
+                sums.lowest,
+                sums.sides,
+                flm,
+                sums.weights,
+                runs,
+                mixing,
+                self._rings,
+                windows,
+                self._tables,
+                out,
+            )
 
-        runs = make_runs(orders, symmetric=self.symmetric, sides=sides)
-        windows = self._windows(max(abs(n) for n in orders))
-        rings, tables = self._rings["adjoint"], self._tables
-        arguments = (self.bandlimit, lowest, sides, spectra, weights, runs, rings, windows, tables, out)
-        tasks = [
-            functools.partial(add_spectra_to_harmonics, first, stop, *arguments)
-            for first, stop in self._ranges(threads)
-        ]
-        run_tasks(tasks, threads)
+        self._share(task, sums.threads)
+
+    def add_to_harmonics(self, columns: Array, sums: OrderSums, out: Array) -> None:
+        """Add to ``out``; shapes as in `compiled.order_sums.add_columns_to_harmonics`."""
+        from spinsdw.compiled.order_sums import add_columns_to_harmonics
+
+        runs, windows = self._geometry(sums)
+
+        def task(first: int, stop: int) -> None:
+            add_columns_to_harmonics(
+                first,
+                stop,
+                self.bandlimit,
+                sums.lowest,
+                sums.sides,
+                columns,
+                sums.weights,
+                runs,
+                self._rings,
+                windows,
+                self._tables,
+                out,
+            )
+
+        self._share(task, sums.threads)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from spinsdw.errors import ParameterError
-from spinsdw.fourier import from_half_series, from_series, to_half_series, to_series
+from spinsdw.fourier import from_series, to_series
 from spinsdw.grid_sums import fill_negative_orders
-from spinsdw.harmonics import check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads, run_tasks
-from spinsdw.ring_engine import RingEngine
-from spinsdw.sampling.base import check_bandlimit
+from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.signals import check_map, check_spin
 
@@ -23,14 +22,67 @@ __all__ = ["HealpixTransform"]
 
 Array = np.ndarray[Any, Any]
 
-# Rings of the equatorial belt that one task transforms.
-_BELT_RINGS = 16
+# Rings that one task transforms.
+_BLOCK_RINGS = 16
 
 
 @functools.lru_cache(maxsize=16)
 def _engine(nside: int, bandlimit: int) -> RingEngine:
     north = HealpixRings(nside).colatitudes[: 2 * nside]
     return RingEngine(bandlimit, north, symmetric=True)
+
+
+@dataclass(frozen=True, eq=False)
+class _RingBlock:
+    """A few neighbouring rings between their Fourier columns and their pixels."""
+
+    first: int
+    sizes: Array
+    phis: Array
+    first_pixel: int
+    real: bool
+
+    @property
+    def _modes(self) -> Array:
+        return self.sizes // 2 + 1 if self.real else self.sizes
+
+    def _transform(
+        self, call: Callable[[Array, Array], None], folded: Array, pixels: Array
+    ) -> None:
+        """Call for runs of rings of one size: (folded, pixels) as (rings, modes or points)."""
+        changes = np.flatnonzero(np.diff(self.sizes)) + 1
+        mode, pixel = 0, self.first_pixel
+        for run in np.split(self.sizes, changes):
+            points = int(run[0])
+            modes = points // 2 + 1 if self.real else points
+            n_modes, n_points = run.size * modes, run.size * points
+            call(
+                folded[mode : mode + n_modes].reshape(run.size, modes),
+                pixels[pixel : pixel + n_points].reshape(run.size, points),
+            )
+            mode, pixel = mode + n_modes, pixel + n_points
+
+    def _room(self) -> tuple[Array, Array]:
+        """Return where each ring's modes begin, and room for all."""
+        modes = self._modes
+        starts = np.concatenate([[0], np.cumsum(modes)[:-1]])
+        return starts, np.empty(int(modes.sum()), dtype=np.complex128)
+
+    def fill_pixels(self, bandlimit: int, columns: Array, pixels: Array) -> None:
+        from spinsdw.compiled.folding import fill_folded
+
+        starts, folded = self._room()
+        geometry = (self.first, self.sizes, self.phis, starts, self.real)
+        fill_folded(bandlimit, columns, *geometry, folded)
+        self._transform(from_series, folded, pixels)
+
+    def fill_columns(self, bandlimit: int, pixels: Array, columns: Array) -> None:
+        from spinsdw.compiled.folding import fill_unfolded
+
+        starts, folded = self._room()
+        self._transform(lambda modes, values: to_series(values, modes), folded, pixels)
+        geometry = (self.first, self.sizes, self.phis, starts, self.real)
+        fill_unfolded(bandlimit, folded, *geometry, columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +149,6 @@ class HealpixTransform:
         """Shape of one map: (pixels,)."""
         return (self.rings.n_pixels,)
 
-    @property
-    def _sides(self) -> int:
-        return 1 if self.real else 2
-
-    @property
-    def _n_m(self) -> int:
-        return self.bandlimit if self.real else 2 * self.bandlimit - 1
-
     @functools.cached_property
     def _weights(self) -> Array:
         el = np.arange(self.bandlimit)
@@ -112,79 +156,40 @@ class HealpixTransform:
         weights[: abs(self.spin)] = 0.0
         return weights.astype(np.complex128)[None]
 
-    @functools.cached_property
-    def _groups(self) -> list[tuple[int, int, float, int]]:
-        """(first ring, rings, first longitude, points) of runs of rings alike."""
-        rings = self.rings
-        sizes, phis = rings.n_phi, rings.first_longitudes
-        groups = [(r, 1, float(phis[r]), int(sizes[r])) for r in range(rings.n_rings)]
-        # Largest first, so that threads finish together.
-        return sorted(groups, key=lambda group: -group[3])
+    @property
+    def _sums(self) -> OrderSums:
+        sides = 1 if self.real else 2
+        return OrderSums((-self.spin,), self._weights, 0, sides, resolve_threads(self.threads))
 
-    def _ring_tasks(self, call: Callable[[list[tuple[int, int, float, int]]], None]) -> None:
-        groups = self._groups
-        step = _BELT_RINGS
-        tasks = [functools.partial(call, groups[i : i + step]) for i in range(0, len(groups), step)]
+    def _columns(self) -> Array:
+        n_m = self.bandlimit if self.real else 2 * self.bandlimit - 1
+        return np.empty((1, n_m, self.rings.n_rings), dtype=np.complex128)
+
+    def _share_rings(self, call: Callable[[_RingBlock], None]) -> None:
+        rings = self.rings
+        sizes, phis, starts = rings.n_phi, rings.first_longitudes, rings.starts
+        blocks = []
+        for first in range(0, rings.n_rings, _BLOCK_RINGS):
+            part = slice(first, first + _BLOCK_RINGS)
+            blocks.append(_RingBlock(first, sizes[part], phis[part], int(starts[first]), self.real))
+        # The long rings first, so that threads finish together.
+        blocks.sort(key=lambda block: -int(block.sizes.sum()))
+        tasks = [functools.partial(call, block) for block in blocks]
         run_tasks(tasks, resolve_threads(self.threads))
 
     def _to_map(self, flm: Array) -> Array:
-        from spinsdw.compiled.folding import fill_half_rings, fill_rings
-
-        rings = self.rings
-        spectra = np.empty((1, rings.n_rings, self._n_m), dtype=np.complex128)
-        _engine(self.nside, self.bandlimit).fill_spectra(
-            flm[None],
-            self._weights,
-            orders=(-self.spin,),
-            mixing=np.ones((1, 1), dtype=np.complex128),
-            lowest=0,
-            sides=self._sides,
-            out=spectra,
-            threads=resolve_threads(self.threads),
-        )
-        pixels = np.empty(rings.n_pixels, dtype=np.float64 if self.real else np.complex128)
-        starts = rings.starts
-        fold = fill_half_rings if self.real else fill_rings
-        back = from_half_series if self.real else from_series
-
-        def task(groups: list[tuple[int, int, float, int]]) -> None:
-            for first, _, phi, points in groups:
-                modes = points // 2 + 1 if self.real else points
-                folded = np.empty((1, modes), dtype=np.complex128)
-                fold(self.bandlimit, spectra[0], first, phi, folded)
-                start = starts[first]
-                back(folded, pixels[None, start : start + points])
-
-        self._ring_tasks(task)
+        columns = self._columns()
+        one = np.ones((1, 1), dtype=np.complex128)
+        _engine(self.nside, self.bandlimit).fill_columns(flm[None], self._sums, one, columns)
+        dtype = np.float64 if self.real else np.complex128
+        pixels = np.empty(self.rings.n_pixels, dtype=dtype)
+        self._share_rings(lambda block: block.fill_pixels(self.bandlimit, columns[0], pixels))
         return pixels
 
     def _to_coefficients(self, pixels: Array, flm: Array) -> None:
-        from spinsdw.compiled.folding import fill_half_unfolded, fill_unfolded
-
-        rings = self.rings
-        columns = np.empty((1, self._n_m, rings.n_rings), dtype=np.complex128)
-        starts = rings.starts
-        unfold = fill_half_unfolded if self.real else fill_unfolded
-        transform = to_half_series if self.real else to_series
-
-        def task(groups: list[tuple[int, int, float, int]]) -> None:
-            for first, _, phi, points in groups:
-                modes = points // 2 + 1 if self.real else points
-                series = np.empty((1, modes), dtype=np.complex128)
-                start = starts[first]
-                transform(pixels[None, start : start + points], series)
-                unfold(self.bandlimit, series, first, phi, columns[0])
-
-        self._ring_tasks(task)
-        _engine(self.nside, self.bandlimit).add_to_harmonics(
-            columns,
-            self._weights,
-            orders=(-self.spin,),
-            lowest=0,
-            sides=self._sides,
-            out=flm[None],
-            threads=resolve_threads(self.threads),
-        )
+        columns = self._columns()
+        self._share_rings(lambda block: block.fill_columns(self.bandlimit, pixels, columns[0]))
+        _engine(self.nside, self.bandlimit).add_to_harmonics(columns, self._sums, flm[None])
 
     def synthesis(self, flm: Array) -> Array:
         """Compute maps from harmonic coefficients.

@@ -46,7 +46,9 @@ def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "
         msg = f"{name} has shape {values.shape}; it must be (..., {expected}) for this transform."
         raise ShapeError(msg)
     if real and values.dtype.kind == "c":
-        msg = f"{name} is complex but real=True was asked for; pass its real part or use real=False."
+        msg = (
+            f"{name} is complex but real=True was asked for; pass its real part or use real=False."
+        )
         raise DataError(msg)
     values = np.ascontiguousarray(values, dtype=np.float64 if real else np.complex128)
     check_finite(values, name)

@@ -11,9 +11,9 @@ import numpy as np
 
 from spinsdw.errors import ParameterError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads
-from spinsdw.sampling.base import Sampling, check_bandlimit, resolve_sampling
+from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_map, check_spin
 
 __all__ = ["SpinHarmonicTransform"]
@@ -173,9 +173,9 @@ class SpinHarmonicTransform:
         return self._to_coefficients(maps, quadrature=True)
 
     def adjoint_synthesis(self, maps: Array) -> Array:
-        """Apply the adjoint of `synthesis`: maps to coefficients; shapes and errors of `analysis`."""
+        """Apply the adjoint of `synthesis` to maps; shapes and errors of `analysis`."""
         return self._to_coefficients(maps, quadrature=False)
 
     def adjoint_analysis(self, flm: Array) -> Array:
-        """Apply the adjoint of `analysis`: coefficients to maps; shapes and errors of `synthesis`."""
+        """Apply the adjoint of `analysis` to coefficients; shapes and errors of `synthesis`."""
         return self._to_maps(flm, quadrature=True)

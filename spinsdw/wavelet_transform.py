@@ -13,9 +13,9 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads
-from spinsdw.sampling.base import Sampling, check_bandlimit, resolve_sampling
+from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_map
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
@@ -102,9 +102,7 @@ class SpinWaveletTransform:
         bandlimit = check_bandlimit(bandlimit)
         grid = resolve_sampling(sampling, bandlimit)
         if tiling is None:
-            tiling = ScaleDiscretisedTiling(
-                bandlimit, dilation=dilation, lowest_scale=lowest_scale
-            )
+            tiling = ScaleDiscretisedTiling(bandlimit, dilation=dilation, lowest_scale=lowest_scale)
         elif tiling.bandlimit != bandlimit:
             msg = (
                 f"tiling has bandlimit {tiling.bandlimit} but the transform has {bandlimit}; "
@@ -113,9 +111,7 @@ class SpinWaveletTransform:
             raise ParameterError(msg)
         wavelets = Wavelets(tiling, Directionality(directions), spin)
         # Checks spin, real and threads.
-        harmonic = SpinHarmonicTransform(
-            bandlimit, spin, sampling=grid, real=real, threads=threads
-        )
+        harmonic = SpinHarmonicTransform(bandlimit, spin, sampling=grid, real=real, threads=threads)
         values = (
             bandlimit,
             harmonic.spin,
@@ -136,12 +132,12 @@ class SpinWaveletTransform:
     @property
     def wavelets(self) -> Wavelets:
         """The wavelets and scaling function in harmonic space."""
-        return self._wavelets  # type: ignore[attr-defined, no-any-return]
+        return self._wavelets  # type: ignore[attr-defined]
 
     @property
     def harmonic(self) -> SpinHarmonicTransform:
         """The transform between maps and harmonic coefficients."""
-        return self._harmonic  # type: ignore[attr-defined, no-any-return]
+        return self._harmonic  # type: ignore[attr-defined]
 
     @property
     def scales(self) -> tuple[int, ...]:
@@ -236,7 +232,7 @@ class SpinWaveletTransform:
 
     def _scale_to_grid(self, flm: Array, scale: int, *, adjoint: bool) -> Array:
         sums, weights, lowest = self._sums(scale)
-        size = sums.sampling.bandlimit ** 2
+        size = sums.sampling.bandlimit**2
         batch = flm.reshape(-1, flm.shape[-1])
         factor = 2 * np.pi / self.directions if adjoint else 1.0
         maps = None
@@ -258,7 +254,7 @@ class SpinWaveletTransform:
     def _add_scale(self, values: Array, scale: int, flm: Array, *, adjoint: bool) -> None:
         sums, weights, lowest = self._sums(scale)
         factor = 1.0 if adjoint else 2 * np.pi / self.directions
-        size = sums.sampling.bandlimit ** 2
+        size = sums.sampling.bandlimit**2
         for one, out in zip(values.reshape(-1, *values.shape[-3:]), flm, strict=True):
             sums.from_grid(
                 one,
@@ -396,7 +392,7 @@ class SpinWaveletTransform:
         return flm
 
     def analysis(self, maps: Array) -> WaveletCoefficients:
-        """Compute wavelet coefficients from maps, shape (..., rings, phi); see `analysis_harmonic`."""
+        """Compute coefficients from maps, shape (..., rings, phi); see `analysis_harmonic`."""
         return self.analysis_harmonic(self.harmonic.analysis(maps))
 
     def synthesis(self, coefficients: WaveletCoefficients) -> Array:

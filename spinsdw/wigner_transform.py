@@ -11,9 +11,9 @@ import numpy as np
 
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums
-from spinsdw.harmonics import check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads
-from spinsdw.sampling.base import Sampling, check_bandlimit, resolve_sampling
+from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_map
 
 __all__ = ["WignerTransform"]
@@ -115,9 +115,7 @@ class WignerTransform:
     @property
     def _sums(self) -> GridSums:
         mixing = np.exp(1j * np.outer(self.gammas, self.orders))
-        return GridSums(
-            self._grid, self.orders, mixing, self.real, resolve_threads(self.threads)
-        )
+        return GridSums(self._grid, self.orders, mixing, self.real, resolve_threads(self.threads))
 
     def _weights(self, per_degree: Array) -> Array:
         weights = np.zeros((len(self.orders), self.bandlimit), dtype=np.complex128)

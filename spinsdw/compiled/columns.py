@@ -1,56 +1,80 @@
-"""Moving Fourier series between rings and columns, and columns onto the full circle in theta."""
+"""Fourier columns F_m(theta): mixed from one set to another, and laid on the full circle in theta.
+
+Columns are complex arrays [k, m, ring].
+"""
 
 from __future__ import annotations
 
+import numpy as np
+
 from spinsdw.compiled.jit import kernel
 
-__all__ = ["fill_circles", "fill_columns", "fill_folded"]
+__all__ = ["fill_circles", "fold_circles", "mix_columns"]
 
 
 @kernel
-def fill_columns(series, mixing, first_ring, columns):
-    """columns[i, m, first_ring + r] = sum_k mixing[i, k] series[k, r, m]."""
-    n_in, n_rings, n_m = series.shape
-    n_out = columns.shape[0]
-    for m in range(n_m):
-        for i in range(n_out):
-            for r in range(n_rings):
+def mix_columns(mixing, first_m, stop_m, columns):
+    """columns[i, m] <- sum_k mixing[i, k] columns[k, m], in place for first_m <= m < stop_m."""
+    n_out, n_in = mixing.shape
+    values = np.empty(n_in, dtype=np.complex128)
+    for m in range(first_m, stop_m):
+        for r in range(columns.shape[2]):
+            for k in range(n_in):
+                values[k] = columns[k, m, r]
+            for i in range(n_out):
                 value = 0.0j
                 for k in range(n_in):
-                    value += mixing[i, k] * series[k, r, m]
-                columns[i, m, first_ring + r] = value
+                    value += mixing[i, k] * values[k]
+                columns[i, m, r] = value
 
 
 @kernel
-def fill_circles(even, odd, parity, offset, circles):
+def fill_circles(columns, mixing, even, odd, parities, offset, circles):
     """Put an even-m and an odd-m column on one full circle: they have opposite parity in theta.
 
-    F_m(-theta) = (-1)^(m + n) F_m(theta); ``parity`` is that sign for even m. Ring t mirrors to
+    circles[i, j] holds sum_k mixing[i, k] of columns even[j] and odd[j] (-1: none) of row k. On it
+    F_m(-theta) = (-1)^(m + n) F_m(theta); parities[i] is that sign for even m. Ring t mirrors to
     ``size - offset - t`` modulo size: offset 1 on MW, 0 on MWSS.
     """
-    size = circles.shape[1]
-    for j in range(circles.shape[0]):
-        for t in range(even.shape[1]):
-            mirror = (size - offset - t) % size
-            if mirror == t:
-                # A pole: the odd-parity function vanishes there.
-                circles[j, t] = even[j, t] if parity > 0 else odd[j, t]
-            else:
-                circles[j, t] = even[j, t] + odd[j, t]
-                circles[j, mirror] = parity * (even[j, t] - odd[j, t])
+    size, n_rings = circles.shape[2], columns.shape[2]
+    for i in range(circles.shape[0]):
+        parity = parities[i]
+        for j in range(circles.shape[1]):
+            out = circles[i, j]
+            for t in range(n_rings):
+                first, second = 0.0j, 0.0j
+                for k in range(mixing.shape[1]):
+                    factor = mixing[i, k]
+                    if even[j] >= 0:
+                        first += factor * columns[k, even[j], t]
+                    if odd[j] >= 0:
+                        second += factor * columns[k, odd[j], t]
+                mirror = (size - offset - t) % size
+                if mirror == t:
+                    # A pole: the odd-parity function vanishes there.
+                    out[t] = first if parity > 0 else second
+                else:
+                    out[t] = first + second
+                    out[mirror] = parity * (first - second)
 
 
 @kernel
-def fill_folded(circles, parity, offset, even, odd):
-    """Transpose of `fill_circles`."""
-    size = circles.shape[1]
-    for j in range(circles.shape[0]):
-        for t in range(even.shape[1]):
-            mirror = (size - offset - t) % size
-            if mirror == t:
-                even[j, t] = circles[j, t] if parity > 0 else 0.0
-                odd[j, t] = 0.0 if parity > 0 else circles[j, t]
-            else:
-                there = parity * circles[j, mirror]
-                even[j, t] = circles[j, t] + there
-                odd[j, t] = circles[j, t] - there
+def fold_circles(circles, even, odd, parities, offset, columns):
+    """Transpose of `fill_circles` without mixing: circles[i] goes to row i of the columns."""
+    size, n_rings = circles.shape[2], columns.shape[2]
+    for i in range(circles.shape[0]):
+        parity = parities[i]
+        for j in range(circles.shape[1]):
+            values = circles[i, j]
+            for t in range(n_rings):
+                mirror = (size - offset - t) % size
+                if mirror == t:
+                    first = values[t] if parity > 0 else 0.0j
+                    second = 0.0j if parity > 0 else values[t]
+                else:
+                    first = values[t] + parity * values[mirror]
+                    second = values[t] - parity * values[mirror]
+                if even[j] >= 0:
+                    columns[i, even[j], t] = first
+                if odd[j] >= 0:
+                    columns[i, odd[j], t] = second

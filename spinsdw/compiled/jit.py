@@ -141,7 +141,7 @@ def _compiled(function: Function, fastmath: set[str]) -> Function:
     folder = None if config.DISABLE_JIT else cache_directory()
     if isinstance(jitted, Dispatcher) and folder is not None:
         jitted._cache = PackageCache(jitted.py_func, folder)
-    return jitted  # type: ignore[no-any-return]
+    return jitted
 
 
 def kernel(function: Function) -> Function:

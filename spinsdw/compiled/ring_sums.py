@@ -1,28 +1,25 @@
 """Sums over degrees for every ring, and their adjoints, for one block of rings at one (m, n).
 
 A block passes three stages. While all its rings are out of range, the degree only advances; while
-some are, the sums of the others are formed (in steps of `PADDING` degrees); once none is, one call
-runs to the end. The columns c or g hold two real numbers for each complex series.
+some are, the sums of the others are formed, `PADDING` degrees at a time; once none is, one call
+runs to the end. The columns c or g hold two real numbers for each complex series. Each tile is
+called from one place only: every call is another copy of its machine code.
 """
 
 from __future__ import annotations
 
 from spinsdw.compiled.jit import kernel
 from spinsdw.compiled.vectors import (
-    ADJOINT_RINGS,
     RINGS,
     add_to_degrees_2,
     add_to_degrees_4,
     add_to_rings_2,
     add_to_rings_4,
     advance,
-    advance_adjoint,
 )
 from spinsdw.compiled.wigner_recursion import PADDING, rescale
 
 __all__ = ["add_block_to_degrees", "sum_block"]
-
-_PAIRS = PADDING // 2
 
 
 @kernel
@@ -35,11 +32,20 @@ def _clear_outside(scale, columns, sums):
 
 
 @kernel
-def _add_to_rings(columns, a, b, c, x, before, now, sums, first, pairs):
-    if columns == 4:
-        add_to_rings_4(a, b, c, x, before, now, sums, first, pairs)
-    else:
-        add_to_rings_2(a, b, c, x, before, now, sums, first, pairs)
+def _mask_outside(scale, columns, g, masked):
+    """Copy the block's columns with zeros where a ring is out of range."""
+    for r in range(RINGS):
+        factor = 1.0 if scale[r] == 0.0 else 0.0
+        for k in range(columns):
+            masked[k * RINGS + r] = factor * g[k * RINGS + r]
+
+
+@kernel
+def _next_pairs(el, lowest, L, is_inside, is_silent):
+    """Return how many pairs of degrees the next call takes."""
+    if not is_inside:
+        return PADDING // 2
+    return (lowest - el) // 2 if is_silent else (L - el + 1) // 2
 
 
 @kernel
@@ -49,59 +55,41 @@ def sum_block(first, lowest, L, columns, a, b, c, x, before, now, scale, sums):
         sums[i] = 0.0
     el = first
     inside = rescale(before, now, scale)
-    while inside < RINGS and el < L:
-        if inside == 0 or el + PADDING <= lowest:
-            advance(a, b, c, x, before, now, sums, el, _PAIRS)
-            inside = rescale(before, now, scale)
+    while el < L:
+        is_inside = inside == RINGS
+        is_silent = inside == 0 or el + PADDING <= lowest
+        pairs = _next_pairs(el, lowest, L, is_inside, is_silent)
+        if is_silent:
+            advance(a, b, c, x, before, now, sums, el, pairs)
+        elif columns == 4:
+            add_to_rings_4(a, b, c, x, before, now, sums, el, pairs)
         else:
-            _add_to_rings(columns, a, b, c, x, before, now, sums, el, _PAIRS)
+            add_to_rings_2(a, b, c, x, before, now, sums, el, pairs)
+        if not is_inside:
             # Before rescaling: a ring that enters now was still out of range in this step.
-            _clear_outside(scale, columns, sums)
+            if not is_silent:
+                _clear_outside(scale, columns, sums)
             inside = rescale(before, now, scale)
-        el += PADDING
-    if el < lowest:
-        pairs = (lowest - el) // 2
-        advance(a, b, c, x, before, now, sums, el, pairs)
         el += 2 * pairs
-    if el < L:
-        _add_to_rings(columns, a, b, c, x, before, now, sums, el, (L - el + 1) // 2)
 
 
 @kernel
-def _mask_outside(scale, columns, g, masked):
-    """Copy the block's columns with zeros where a ring is out of range."""
-    for r in range(ADJOINT_RINGS):
-        factor = 1.0 if scale[r] == 0.0 else 0.0
-        for k in range(columns):
-            masked[k * ADJOINT_RINGS + r] = factor * g[k * ADJOINT_RINGS + r]
-
-
-@kernel
-def _add_to_degrees(columns, a, b, g, x, before, now, sums, first, pairs):
-    if columns == 4:
-        add_to_degrees_4(a, b, g, x, before, now, sums, first, pairs)
-    else:
-        add_to_degrees_2(a, b, g, x, before, now, sums, first, pairs)
-
-
-@kernel
-def add_block_to_degrees(
-    first, lowest, L, columns, a, b, g, masked, x, before, now, scale, sums
-):
+def add_block_to_degrees(first, lowest, L, columns, a, b, g, masked, x, before, now, scale, sums):
     """sums[l, k, lane] += sum_r g[k, r] u_l(x_r) over the rings of each lane, lowest <= l < L."""
     el = first
     inside = rescale(before, now, scale)
-    while inside < ADJOINT_RINGS and el < L:
-        if inside == 0 or el + PADDING <= lowest:
-            advance_adjoint(a, b, g, x, before, now, sums, el, _PAIRS)
+    _mask_outside(scale, columns, g, masked)
+    while el < L:
+        is_inside = inside == RINGS
+        is_silent = inside == 0 or el + PADDING <= lowest
+        pairs = _next_pairs(el, lowest, L, is_inside, is_silent)
+        if is_silent:
+            advance(a, b, g, x, before, now, sums, el, pairs)
+        elif columns == 4:
+            add_to_degrees_4(a, b, masked, x, before, now, sums, el, pairs)
         else:
+            add_to_degrees_2(a, b, masked, x, before, now, sums, el, pairs)
+        if not is_inside:
+            inside = rescale(before, now, scale)
             _mask_outside(scale, columns, g, masked)
-            _add_to_degrees(columns, a, b, masked, x, before, now, sums, el, _PAIRS)
-        inside = rescale(before, now, scale)
-        el += PADDING
-    if el < lowest:
-        pairs = (lowest - el) // 2
-        advance_adjoint(a, b, g, x, before, now, sums, el, pairs)
         el += 2 * pairs
-    if el < L:
-        _add_to_degrees(columns, a, b, g, x, before, now, sums, el, (L - el + 1) // 2)

@@ -17,16 +17,12 @@ from __future__ import annotations
 import os
 from typing import Any
 
-import numba
 from llvmlite import binding, ir
 from numba.core import config, types
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-from spinsdw.compiled.jit import kernel
-
 __all__ = [
-    "ADJOINT_RINGS",
     "RINGS",
     "WIDTH",
     "add_to_degrees_2",
@@ -34,7 +30,6 @@ __all__ = [
     "add_to_rings_2",
     "add_to_rings_4",
     "advance",
-    "advance_adjoint",
 ]
 
 
@@ -53,10 +48,9 @@ def _host_width() -> int:
 
 
 WIDTH = _host_width()
-# (vectors of the synthesis, vectors of the adjoint): as many as the register file holds.
-VECTORS, ADJOINT_VECTORS = {8: (3, 4), 4: (2, 2), 2: (2, 2)}[WIDTH]
+# Vectors of rings that a tile of four columns keeps in registers with all it needs.
+VECTORS = {8: 4, 4: 2, 2: 2}[WIDTH]
 RINGS = VECTORS * WIDTH
-ADJOINT_RINGS = ADJOINT_VECTORS * WIDTH
 
 _INDEX = ir.IntType(64)
 
@@ -105,7 +99,9 @@ def _constant(value: int) -> Any:
     return ir.Constant(_INDEX, value)
 
 
-def _degree_loop(emit: _Emitter, first: Any, pairs: Any, carried: list[Any], step: Any) -> list[Any]:
+def _degree_loop(
+    emit: _Emitter, first: Any, pairs: Any, carried: list[Any], step: Any
+) -> list[Any]:
     """Emit ``for l in range(first, first + 2 pairs)``, two degrees a pass.
 
     ``carried`` are the vectors that live in registers; ``step(l, carried) -> carried`` emits the
@@ -155,10 +151,10 @@ def _make_ring_tile(vectors: int, columns: int, width: int) -> Any:
     """Build tile(a, b, c, x, before, now, sums, first, pairs); columns = 0 only advances."""
 
     @intrinsic
-    def tile(typing, a, b, c, x, before, now, sums, first, pairs):  # type: ignore[no-untyped-def]  # noqa: PLR0913, ARG001
+    def tile(typing, a, b, c, x, before, now, sums, first, pairs):  # noqa: ARG001
         sig = types.void(a, b, c, x, before, now, sums, first, pairs)
 
-        def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        def codegen(context, builder, sig, args):
             p_a, p_b, p_c, p_x, p_0, p_1, p_sums = _pointers(context, builder, sig, args, 7)
             emit = _Emitter(builder, width)
             rows = range(vectors)
@@ -167,7 +163,7 @@ def _make_ring_tile(vectors: int, columns: int, width: int) -> Any:
             places = [_constant(i * width) for i in range(columns * vectors)]
             carried += [emit.load(p_sums, place) for place in places]
 
-            def step(el, state):  # type: ignore[no-untyped-def]
+            def step(el, state):
                 u0, u1 = state[:vectors], state[vectors : 2 * vectors]
                 acc = state[2 * vectors :]
                 base = builder.mul(el, _constant(columns))
@@ -198,10 +194,10 @@ def _make_degree_tile(vectors: int, columns: int, width: int) -> Any:
     """
 
     @intrinsic
-    def tile(typing, a, b, g, x, before, now, sums, first, pairs):  # type: ignore[no-untyped-def]  # noqa: PLR0913, ARG001
+    def tile(typing, a, b, g, x, before, now, sums, first, pairs):  # noqa: ARG001
         sig = types.void(a, b, g, x, before, now, sums, first, pairs)
 
-        def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        def codegen(context, builder, sig, args):
             p_a, p_b, p_g, p_x, p_0, p_1, p_sums = _pointers(context, builder, sig, args, 7)
             emit = _Emitter(builder, width)
             rows = range(vectors)
@@ -209,7 +205,7 @@ def _make_degree_tile(vectors: int, columns: int, width: int) -> Any:
             carried = [emit.load(p, _constant(v * width)) for p in (p_0, p_1) for v in rows]
             g_kv = [emit.load(p_g, _constant(i * width)) for i in range(columns * vectors)]
 
-            def step(el, state):  # type: ignore[no-untyped-def]
+            def step(el, state):
                 u0, u1 = state[:vectors], state[vectors:]
                 base = builder.mul(el, _constant(columns * width))
                 for k in range(columns):
@@ -233,9 +229,9 @@ def _make_degree_tile(vectors: int, columns: int, width: int) -> Any:
 
 
 def _make_plain_ring_tile(rings: int, columns: int) -> Any:
-    """The sum over degrees as plain loops: what `_make_ring_tile` computes."""
+    """Build the sum over degrees as plain loops: what `_make_ring_tile` computes."""
 
-    def tile(a, b, c, x, before, now, sums, first, pairs):  # type: ignore[no-untyped-def]  # noqa: PLR0913
+    def tile(a, b, c, x, before, now, sums, first, pairs):
         for el in range(first, first + 2 * pairs):
             for r in range(rings):
                 for k in range(columns):
@@ -248,9 +244,9 @@ def _make_plain_ring_tile(rings: int, columns: int) -> Any:
 
 
 def _make_plain_degree_tile(rings: int, columns: int, width: int) -> Any:
-    """The sum over rings as plain loops: what `_make_degree_tile` computes."""
+    """Build the sum over rings as plain loops: what `_make_degree_tile` computes."""
 
-    def tile(a, b, g, x, before, now, sums, first, pairs):  # type: ignore[no-untyped-def]  # noqa: PLR0913
+    def tile(a, b, g, x, before, now, sums, first, pairs):
         for el in range(first, first + 2 * pairs):
             for r in range(rings):
                 for k in range(columns):
@@ -266,13 +262,11 @@ if config.DISABLE_JIT:
     add_to_rings_4 = _make_plain_ring_tile(RINGS, 4)
     add_to_rings_2 = _make_plain_ring_tile(RINGS, 2)
     advance = _make_plain_ring_tile(RINGS, 0)
-    add_to_degrees_4 = _make_plain_degree_tile(ADJOINT_RINGS, 4, WIDTH)
-    add_to_degrees_2 = _make_plain_degree_tile(ADJOINT_RINGS, 2, WIDTH)
-    advance_adjoint = _make_plain_ring_tile(ADJOINT_RINGS, 0)
+    add_to_degrees_4 = _make_plain_degree_tile(RINGS, 4, WIDTH)
+    add_to_degrees_2 = _make_plain_degree_tile(RINGS, 2, WIDTH)
 else:
     add_to_rings_4 = _make_ring_tile(VECTORS, 4, WIDTH)
     add_to_rings_2 = _make_ring_tile(VECTORS, 2, WIDTH)
     advance = _make_ring_tile(VECTORS, 0, WIDTH)
-    add_to_degrees_4 = _make_degree_tile(ADJOINT_VECTORS, 4, WIDTH)
-    add_to_degrees_2 = _make_degree_tile(ADJOINT_VECTORS, 2, WIDTH)
-    advance_adjoint = _make_ring_tile(ADJOINT_VECTORS, 0, WIDTH)
+    add_to_degrees_4 = _make_degree_tile(VECTORS, 4, WIDTH)
+    add_to_degrees_2 = _make_degree_tile(VECTORS, 2, WIDTH)

@@ -32,9 +32,15 @@ Array = np.ndarray[Any, Any]
 _BATCH_SIZE = 2**14
 
 
+def _modes(size: int) -> Array:
+    """Return 0, 1, .., -1: the mode of each place of a Fourier series."""
+    k = np.arange(size)
+    return np.where(2 * k < size, k, k - size)
+
+
 def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array]:
     """|sin(theta)| up to degree 2 L - 2, at theta = first + 2 pi t / size and half a step on."""
-    degree = np.fft.fftfreq(2 * size, 1 / (2 * size))
+    degree = _modes(2 * size)
     even = (degree % 2 == 0) & (np.abs(degree) <= 2 * bandlimit - 2)
     series = np.where(even, 2 / (np.pi * (1 - np.where(even, degree, 0.0) ** 2)), 0.0)
     values = np.fft.ifft(series * np.exp(1j * degree * first)).real * (2 * size)
@@ -43,8 +49,7 @@ def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array
 
 def _shift_phases(size: int) -> Array:
     """Factors exp(i k pi / size) of a shift by half a step; the Nyquist term carries nothing."""
-    k = np.fft.fftfreq(size, 1 / size)
-    phases = np.exp(1j * np.pi * k / size)
+    phases = np.exp(1j * np.pi * _modes(size) / size)
     if size % 2 == 0:
         phases[size // 2] = 0.0
     return phases
@@ -71,7 +76,7 @@ class _Equiangular(Sampling):
         return here * factor, between * factor / size**2, _shift_phases(size)
 
     def _project(self, circles: Array) -> None:
-        """circles <- (w_A + S^T w_B S) circles, times the constants."""
+        """Circles <- (w_A + S^T w_B S) circles, times the constants."""
         here, between, phases = self._weights
         work, shifted = np.empty_like(circles), np.empty_like(circles)
         to_series(circles, work)
@@ -84,35 +89,43 @@ class _Equiangular(Sampling):
         circles *= here
         circles += shifted
 
-    def _weigh_batch(self, columns: Array, even: Array, odd: Array, parity: float) -> None:
-        from spinsdw.compiled.columns import fill_circles, fill_folded
+    def _weigh_batch(
+        self, columns: Array, mixing: Array, parities: Array, pairs: tuple[Array, Array]
+    ) -> None:
+        from spinsdw.compiled.columns import fill_circles, fold_circles
 
-        pairs = max(even.size, odd.size)
-        values = np.zeros((2, pairs, self.n_rings), dtype=np.complex128)
-        values[0, : even.size], values[1, : odd.size] = columns[even], columns[odd]
-        circles = np.empty((pairs, self.n_phi), dtype=np.complex128)
-        fill_circles(values[0], values[1], parity, self._offset, circles)
+        even, odd = pairs
+        shape = (parities.size, even.size, self.n_phi)
+        circles = np.empty(shape, dtype=np.complex128)
+        fill_circles(columns, mixing, even, odd, parities, self._offset, circles)
         self._project(circles)
-        fill_folded(circles, parity, self._offset, values[0], values[1])
-        columns[even], columns[odd] = values[0, : even.size], values[1, : odd.size]
+        fold_circles(circles, even, odd, parities, self._offset, columns)
 
-    def weigh_columns(self, columns: Array, orders: tuple[int, ...], *, threads: int) -> None:
-        n_m = columns.shape[1]
+    def _pairs(self, n_m: int) -> tuple[Array, Array]:
+        """Return places of even m and of odd m, in two arrays of one length, -1 for none."""
         m = np.arange(n_m)
         if n_m == self.n_phi:
             m = np.where(m < self.bandlimit, m, m - n_m)
         even, odd = np.flatnonzero(m % 2 == 0), np.flatnonzero(m % 2 != 0)
-        step = max(1, _BATCH_SIZE // self.n_phi)
+        pairs = np.full((2, max(even.size, odd.size)), -1)
+        pairs[0, : even.size], pairs[1, : odd.size] = even, odd
+        return pairs[0], pairs[1]
+
+    def weigh_columns(
+        self, columns: Array, orders: tuple[int, ...], *, mixing: Array, threads: int
+    ) -> None:
+        even, odd = self._pairs(columns.shape[1])
+        parities = np.where(np.array(orders) % 2 == 0, 1.0, -1.0)
+        step = max(1, _BATCH_SIZE // (self.n_phi * len(orders)))
         tasks = [
             functools.partial(
                 self._weigh_batch,
-                columns[i],
-                even[j : j + step],
-                odd[j : j + step],
-                -1.0 if n % 2 else 1.0,
+                columns,
+                mixing,
+                parities,
+                (even[j : j + step], odd[j : j + step]),
             )
-            for i, n in enumerate(orders)
-            for j in range(0, max(even.size, odd.size), step)
+            for j in range(0, even.size, step)
         ]
         run_tasks(tasks, threads)
 
@@ -141,10 +154,12 @@ class MW(_Equiangular):
 
     @property
     def n_rings(self) -> int:
+        """Number of rings, L."""
         return self.bandlimit
 
     @property
     def colatitudes(self) -> Array:
+        """Colatitude of each ring in radians; float64, shape (n_rings,)."""
         return (2 * np.arange(self.bandlimit) + 1) * np.pi / (2 * self.bandlimit - 1)
 
 
@@ -170,8 +185,10 @@ class MWSS(_Equiangular):
 
     @property
     def n_rings(self) -> int:
+        """Number of rings, L + 1."""
         return self.bandlimit + 1
 
     @property
     def colatitudes(self) -> Array:
+        """Colatitude of each ring in radians; float64, shape (n_rings,)."""
         return np.pi * np.arange(self.bandlimit + 1) / self.bandlimit

@@ -4,8 +4,9 @@ For a wavelet psi moved to rho = (alpha, beta, gamma) and a mask M the share is
 
     f(rho) = <1 - M, R_rho |psi|^2> / <1, |psi|^2>,
 
-between 0 and 1. |psi|^2 is a scalar function of bandlimit 2 L_j - 1 with even orders |q| <= 2 (N - 1)
-only, so f is one correlation on the rotation group, computed as a wavelet analysis of 1 - M is.
+between 0 and 1. |psi|^2 is a scalar function of bandlimit 2 L_j - 1, with even orders up to
+2 (N - 1) only, so f is one correlation on the rotation group, computed as a wavelet analysis of
+1 - M is.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from spinsdw.compiled.folding import fill_rings
 from spinsdw.fourier import from_series
 from spinsdw.parallel import resolve_threads
-from spinsdw.ring_engine import RingEngine
+from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -77,6 +77,8 @@ def correlate_with_energy(
     ndarray, shape (N, rings, phi), float64
         The correlation; for 0 <= holes <= 1 a share between 0 and 1.
     """
+    from spinsdw.compiled.folding import fill_folded
+
     bandlimit = int(np.sqrt(holes.size))
     largest = min(2 * (gammas.size - 1), 2 * ((bandlimit - 1) // 2))
     orders = tuple(range(-largest, largest + 1, 2))
@@ -85,23 +87,19 @@ def correlate_with_energy(
         el = np.arange(abs(q), bandlimit)
         row[abs(q) :] = energy[el**2 + el + q].conj()
     weights /= np.sqrt(4 * np.pi) * energy[0].real
-    count = resolve_threads(threads)
-    spectra = np.empty((gammas.size, grid.n_rings, 2 * bandlimit - 1), dtype=np.complex128)
-    RingEngine(bandlimit, grid.colatitudes).fill_spectra(
-        holes[None],
-        weights,
-        orders=orders,
-        mixing=np.exp(1j * np.outer(gammas, orders)),
-        lowest=0,
-        out=spectra,
-        threads=count,
-    )
+    columns = np.empty((gammas.size, 2 * bandlimit - 1, grid.n_rings), dtype=np.complex128)
+    mixing = np.exp(1j * np.outer(gammas, orders))
+    sums = OrderSums(orders, weights, threads=resolve_threads(threads))
+    RingEngine(bandlimit, grid.colatitudes).fill_columns(holes[None], sums, mixing, columns)
     shares = np.empty((gammas.size, *grid.shape))
-    folded = np.empty(grid.shape, dtype=np.complex128)
-    for spectrum, share in zip(spectra, shares, strict=True):
-        fill_rings(bandlimit, spectrum, 0, 0.0, folded)
-        from_series(folded, folded)
-        share[...] = folded.real
+    sizes = np.full(grid.n_rings, grid.n_phi)
+    starts = np.arange(grid.n_rings) * grid.n_phi
+    folded = np.empty(grid.n_rings * grid.n_phi, dtype=np.complex128)
+    for column, share in zip(columns, shares, strict=True):
+        fill_folded(bandlimit, column, 0, sizes, np.zeros(grid.n_rings), starts, False, folded)
+        rows = folded.reshape(grid.shape)
+        from_series(rows, rows)
+        share[...] = rows.real
     return shares
 
 
@@ -130,8 +128,9 @@ def energy_shares(
     for key, shape in transform.shapes.items():
         is_scaling = key == "scaling"
         size = tiling.scaling_bandlimit if is_scaling else tiling.scale_bandlimit(int(key))
+        kept: tuple[int, ...] = (0,)
         if is_scaling:
-            psi, kept = wavelets.scaling_harmonics[None, :size].astype(np.complex128), (0,)
+            psi = wavelets.scaling_harmonics[None, :size].astype(np.complex128)
             gammas = np.zeros(1)
         else:
             kept = tuple(n for n in orders if abs(n) < size)

@@ -57,9 +57,7 @@ class PseudoMethod:
     @functools.cached_property
     def weights(self) -> dict[int | str, Array]:
         """1 where a wavelet sees no hole, falling smoothly to 0 at ``largest_share``."""
-        return {
-            key: 1.0 - taper(share / self.largest_share) for key, share in self.shares.items()
-        }
+        return {key: 1.0 - taper(share / self.largest_share) for key, share in self.shares.items()}
 
     def apply(self, coefficients: WaveletCoefficients) -> WaveletCoefficients:
         """Weigh the coefficients of the masked map."""

@@ -8,11 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from spinsdw.errors import ParameterError, ShapeError
-from spinsdw.harmonics import resize
+from spinsdw.harmonics import check_bandlimit, resize
 from spinsdw.healpix import HealpixFit, default_bandlimit, flm_to_map, map_to_flm, nside_of
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.sampling import MW, MWSS, Sampling
-from spinsdw.sampling.base import check_bandlimit
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -25,7 +24,9 @@ class Sky(Protocol):
     """What a separation asks of the sky it works on."""
 
     @property
-    def bandlimit(self) -> int: ...
+    def bandlimit(self) -> int:
+        """Degrees used are below it."""
+        ...
 
     @property
     def sampling_name(self) -> str:
@@ -56,17 +57,19 @@ class HealpixSky:
 
     @property
     def sampling_name(self) -> str:
+        """Kind of grid the wavelet coefficients of this sky live on."""
         return "mw"
 
     def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
-        return map_to_flm(
-            p, self.bandlimit, 2, tolerance=self.tolerance, threads=self.threads
-        )
+        """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
+        return map_to_flm(p, self.bandlimit, 2, tolerance=self.tolerance, threads=self.threads)
 
     def scalar_map(self, flm: Array) -> Array:
+        """Return the complex map of spin-0 coefficients of any bandlimit."""
         return flm_to_map(flm, self.nside, threads=self.threads)
 
     def integrals(self, weights: Array, bandlimit: int) -> Array:
+        """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
         # A sum over pixel centres: no fit, so that a share computed from it stays non-negative.
         transform = HealpixTransform(self.nside, bandlimit, real=True, threads=self.threads)
         return transform.adjoint_synthesis(weights) * (4 * np.pi / weights.size)
@@ -81,10 +84,12 @@ class GridSky:
 
     @property
     def bandlimit(self) -> int:
+        """Degrees used are below it."""
         return self.sampling.bandlimit
 
     @property
     def sampling_name(self) -> str:
+        """Kind of grid the wavelet coefficients of this sky live on."""
         return self.sampling.name
 
     def _transform(self, spin: int, *, real: bool = False) -> SpinHarmonicTransform:
@@ -93,12 +98,15 @@ class GridSky:
         )
 
     def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
+        """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
         return self._transform(2).analysis(p), None
 
     def scalar_map(self, flm: Array) -> Array:
+        """Return the complex map of spin-0 coefficients of any bandlimit."""
         return self._transform(0).synthesis(resize(flm, self.bandlimit))
 
     def integrals(self, weights: Array, bandlimit: int) -> Array:
+        """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
         # Between its samples a mask on this grid is the band-limited function they define.
         return resize(self._transform(0, real=True).analysis(weights), bandlimit)
 
