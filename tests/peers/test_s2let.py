@@ -1,0 +1,150 @@
+"""Wavelet transforms against the C library S2LET."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spinsdw.tiling import ScaleDiscretisedTiling
+from spinsdw.wavelet_transform import SpinWaveletTransform
+from tests.helpers import EPS, assert_close, needs_compiler, random_flm, random_like
+
+pys2let = pytest.importorskip("pys2let")
+
+# dilation, bandlimit, lowest scale, directions, spin, whether every scale is sampled at L.
+# The peer's layout is at fault where N > L_j, so the lowest scale keeps dilation**(J0+1) >= N.
+SMALL = [
+    (2.0, 16, 0, 1, 0, 0),
+    (2.0, 16, 0, 2, 2, 0),
+    (2.0, 16, 1, 3, -2, 1),
+    (3.0, 16, 1, 4, 1, 0),
+]
+LARGE = [
+    (2.0, 32, 2, 3, 0, 0),
+    (2.0, 32, 2, 3, 2, 0),
+    (2.0, 32, 2, 4, 2, 1),
+    (2.0, 33, 2, 5, -3, 0),
+    (3.0, 30, 1, 6, -2, 0),
+    (1.5, 24, 2, 3, 2, 0),
+    (1.5, 40, 3, 2, 0, 1),
+    (2.0, 128, 2, 3, 2, 0),
+    (2.0, 128, 2, 4, 0, 1),
+]
+CASES = SMALL + [pytest.param(*case, marks=needs_compiler) for case in LARGE]
+every_case = pytest.mark.parametrize(
+    ("dilation", "bandlimit", "lowest_scale", "directions", "spin", "upsample"), CASES
+)
+
+
+def make_transform(dilation, bandlimit, lowest_scale, directions, spin, upsample):
+    """Take the peer's tiling: its quadrature, and its empty scale too many where it has one."""
+    tiling = ScaleDiscretisedTiling(
+        bandlimit, dilation=dilation, lowest_scale=lowest_scale, quadrature="s2let"
+    )
+    return SpinWaveletTransform(
+        bandlimit, spin, directions, multiresolution=not upsample, tiling=tiling
+    )
+
+
+def split_scales(transform, values):
+    """Cut the peer's array into scales of shape (2N - 1 gammas, rings, phi)."""
+    gammas, scales, start = 2 * transform.directions - 1, {}, 0
+    for scale in transform.scales:
+        shape = (gammas, *transform.shapes[scale][1:])
+        stop = start + int(np.prod(shape))
+        scales[scale] = values[start:stop].reshape(shape)
+        start = stop
+    assert start == values.size
+    return scales
+
+
+@every_case
+def test_analysis_agrees(dilation, bandlimit, lowest_scale, directions, spin, upsample):
+    """At all of the peer's gammas, 2 pi k / (2N - 1): we steer to them."""
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    signal = transform.harmonic.synthesis(random_flm(bandlimit, spin))
+    coefficients = transform.analysis(signal)
+    wavelets, scaling = pys2let.analysis_px2wav(signal.ravel(), *arguments)
+    size = np.max(np.abs(wavelets))
+    # Two harmonic transforms and one on SO(3) each, at 4 L ulps.
+    atol = (16 * bandlimit + 32) * EPS * size
+    for scale, peer in split_scales(transform, wavelets).items():
+        for k, values in enumerate(peer):
+            ours = coefficients.steer(2 * np.pi * k / len(peer))[scale]
+            np.testing.assert_allclose(ours, values, rtol=0, atol=atol, err_msg=str(scale))
+    np.testing.assert_allclose(coefficients.scaling.ravel(), scaling, rtol=0, atol=atol)
+
+
+@every_case
+def test_synthesis_agrees(dilation, bandlimit, lowest_scale, directions, spin, upsample):
+    """Of coefficients changed at random, scale by scale, so that no analysis made them."""
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    flm = random_flm(bandlimit, spin)
+    coefficients = transform.analysis_harmonic(flm)
+    factors = {scale: np.cos(scale) for scale in transform.scales} | {"scaling": 2.0}
+    changed = coefficients * factors
+    gammas = 2 * np.pi * np.arange(2 * directions - 1) / (2 * directions - 1)
+    steered = [changed.steer(gamma) for gamma in gammas]
+    wavelets = [one[scale].ravel() for scale in transform.scales for one in steered]
+    desired = pys2let.synthesis_wav2px(
+        np.concatenate(wavelets), changed.scaling.ravel(), *arguments
+    )
+    found = transform.synthesis(changed)
+    assert_close(found.ravel(), desired, ulps=16 * bandlimit + 32)
+
+
+@pytest.mark.parametrize("spin", [0, 2, -1])
+@pytest.mark.parametrize("upsample", [0, 1])
+def test_adjoint_synthesis_agrees_for_one_direction(spin, upsample):
+    """With N = 1 both store one gamma, and the plain dot products are the same.
+
+    Compared in what a synthesis sees, for the peer extends maps that are not band-limited its own
+    way.
+    """
+    arguments = (2.0, 16, 2, 1, spin, upsample)
+    transform = make_transform(*arguments)
+    noise = random_like(np.empty(transform.harmonic.shape, dtype=complex))
+    ours = transform.adjoint_synthesis(noise)
+    wavelets, scaling = pys2let.synthesis_adjoint_px2wav(noise.ravel(), *arguments)
+    peer = split_scales(transform, wavelets)
+    # <A f, A' g> = <f, A* A' g>: pair both with the coefficients of signals.
+    for seed in range(3):
+        probe = transform.analysis_harmonic(random_flm(16, spin, seed=seed))
+        one = np.vdot(probe.scaling, ours.scaling)
+        other = np.vdot(probe.scaling, scaling.reshape(probe.scaling.shape))
+        for scale in transform.scales:
+            one += np.vdot(probe[scale], ours[scale])
+            other += np.vdot(probe[scale], peer[scale])
+        assert abs(one - other) < 1e-13 * probe.norm() * ours.norm()
+
+
+@pytest.mark.parametrize("spin", [0, 2])
+def test_adjoint_analysis_of_coefficients_agrees_for_one_direction(spin):
+    arguments = (2.0, 16, 2, 1, spin, 0)
+    transform = make_transform(*arguments)
+    noise = transform.analysis_harmonic(random_flm(16, spin)).map(random_like)
+    wavelets = np.concatenate([noise[scale].ravel() for scale in transform.scales])
+    peer = pys2let.analysis_adjoint_wav2px(wavelets, noise.scaling.ravel(), *arguments)
+    ours = transform.adjoint_analysis(noise)
+    # In what a synthesis sees: the adjoint synthesis of both.
+    found = transform.harmonic.adjoint_synthesis(ours)
+    desired = transform.harmonic.adjoint_synthesis(peer.reshape(ours.shape))
+    assert_close(found, desired, ulps=16 * 16 + 32)
+
+
+@pytest.mark.parametrize("directions", [1, 2, 3, 4])
+def test_full_sky_identity_holds_in_the_peer_too(directions):
+    """W^E = -Re W_P and W^B = -Im W_P of E and B analysed by spin-0 wavelets, ours against its."""
+    bandlimit = 16
+    transform = make_transform(2.0, bandlimit, 2, directions, 2, 0)
+    p_lm = random_flm(bandlimit, 2)
+    ours = transform.analysis_harmonic(p_lm)
+    scalar = make_transform(2.0, bandlimit, 2, directions, 0, 0)
+    signal = scalar.harmonic.synthesis(-p_lm)
+    wavelets, _ = pys2let.analysis_px2wav(signal.ravel(), 2.0, bandlimit, 2, directions, 0, 0)
+    for scale, peer in split_scales(scalar, wavelets).items():
+        for k, values in enumerate(peer):
+            steered = ours.steer(2 * np.pi * k / len(peer))[scale]
+            np.testing.assert_allclose(-steered, values, rtol=0, atol=1e-12)
