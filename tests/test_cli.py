@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import inspect
 import io
+import re
 import subprocess
 import sys
 import warnings
@@ -305,6 +306,14 @@ def test_summary_is_printed_and_written(maps, out):
     for name in ("Q, U", "maps", "mask", "degrees", "fit", "rms", "kept", "seconds", "written"):
         assert f"\n{name} " in text
     assert max(map(len, text.splitlines())) <= 88 + len(str(out))
+
+
+def test_no_scale_is_kept_on_more_than_the_observed_sky(maps, out):
+    text = run_well("separate", maps, "--galactic-cut", "20", "--taper", "0.9", out=out)
+    observed = float(re.search(r"sky +([\d.]+)% observed", text)[1])
+    kept = [float(share) for share in re.findall(r"([\d.]+)%  scale", text)]
+    assert len(kept) == 2
+    assert 0 < max(kept) <= observed
 
 
 def test_only_the_files_told_are_written(maps, out):

@@ -127,9 +127,12 @@ def _kept(maps: EBMaps) -> str:
 
 
 def _kept_lines(maps: EBMaps) -> Iterator[str]:
-    for key, share in maps.info.kept_fraction.items():
+    for key, kept in maps.info.kept_fraction.items():
+        # A share of the sky, where there is a map of the weights; else one of the coefficients,
+        # which are denser near the poles.
+        share = kept if isinstance(key, str) else float(np.mean(maps.weights[key]))
         low, high = part_degrees(key, maps.coefficients.parameters)
-        name = "scaling" if key == "scaling" else f"scale {key}"
+        name = "scaling" if isinstance(key, str) else f"scale {key}"
         degrees = f"degrees {low:4d} to {high:4d}" if low <= high else "no degrees"
         yield f"{share:6.1%}  {name:9} {degrees}"
 
