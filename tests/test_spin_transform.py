@@ -89,6 +89,21 @@ def test_analysis_undoes_synthesis(bandlimit, spin, sampling):
     assert not np.any(found[: spin**2])
 
 
+@needs_compiler
+@pytest.mark.parametrize("sampling", GRIDS)
+@pytest.mark.parametrize("first", [1, 50, 100, 190])
+def test_every_bandlimit_round_trips(first, sampling):
+    """Once the quadrature took n * (1 / n), which is below 1 for n = 49, 98, 103, ..., for 1.
+
+    It lost the whole analysis at L = 25, 52, 54, ... on MW, and 49, 98, ... on MWSS.
+    """
+    for bandlimit in range(first, first + 50):
+        transform = SpinHarmonicTransform(bandlimit, sampling=sampling, real=True)
+        flm = random_real_flm(bandlimit)
+        found = transform.analysis(transform.synthesis(flm))
+        assert_close(found, flm, ulps=tolerance(bandlimit))
+
+
 @pytest.mark.parametrize("sampling", GRIDS)
 @pytest.mark.parametrize("bandlimit", [2, 3, 9])
 def test_every_possible_spin_round_trips(bandlimit, sampling):

@@ -71,6 +71,8 @@ LARGE += [
     (64, 0, 1, {"real": True}),
     (64, 0, 4, {"real": True, "sampling": "mwss"}),
     (64, 0, 5, {"real": True, "multiresolution": False, "lowest_scale": 2}),
+    # Scales of bandlimits 26, 39, 58, 87, 130 and 195: sizes that no power of 2 leads to.
+    (200, 2, 3, {"dilation": 1.5}),
 ]
 CASES = SMALL + [pytest.param(*case, marks=needs_compiler) for case in LARGE]
 any_case = pytest.mark.parametrize(("bandlimit", "spin", "directions", "options"), CASES)
