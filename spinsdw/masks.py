@@ -27,6 +27,7 @@ __all__ = [
     "check_mask",
     "degrade",
     "distance_to_edge",
+    "fill_holes",
     "galactic_cut",
     "sky_fraction",
     "taper",
@@ -307,6 +308,58 @@ def apodise(mask: ArrayLike, width: float, *, profile: str = "smooth") -> FloatA
     weights = _checked(mask)
     distances = np.minimum(_bounded_distance(weights, width), width)
     return weights * PROFILES[profile](np.sin(distances / 2) / math.sin(width / 2))
+
+
+def fill_holes(mask: ArrayLike, largest: float) -> FloatArray:
+    """Observe again what a mask hides in small holes, such as those at point sources.
+
+    A hole is a set of neighbouring pixels of weight 0.  For a signal that point sources do not
+    touch, such as diffuse synchrotron, this leaves the galactic part of an analysis mask.
+
+    Parameters
+    ----------
+    mask : array_like, shape (npix,)
+        RING order; nside a power of two.
+    largest : float
+        Solid angle in steradians; holes of at most this size are filled.
+
+    Returns
+    -------
+    ndarray, shape (npix,), float64
+        RING order, 1 where a hole was filled.
+
+    Raises
+    ------
+    ParameterError
+        If ``largest`` is not positive.
+
+    Examples
+    --------
+    >>> mask = galactic_cut(16, np.radians(20))
+    >>> mask[0] = 0
+    >>> bool(np.array_equal(fill_holes(mask, 0.01), galactic_cut(16, np.radians(20))))
+    True
+    """
+    import healpy
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    if not 0 < largest < np.inf:
+        msg = f"largest={largest} must be a solid angle above 0; np.radians(5) ** 2 is 25 deg^2."
+        raise ParameterError(msg)
+    weights = _checked(mask)
+    hidden = np.flatnonzero(weights == 0)
+    place = np.full(weights.size, -1)
+    place[hidden] = np.arange(hidden.size)
+    neighbours = healpy.get_all_neighbours(nside_of(weights), hidden)
+    rows = np.broadcast_to(np.arange(hidden.size), neighbours.shape)
+    # healpy says -1 for a neighbour that does not exist.
+    joined = (neighbours >= 0) & (place[neighbours] >= 0)
+    links = (np.ones(np.count_nonzero(joined)), (rows[joined], place[neighbours[joined]]))
+    count, label = connected_components(coo_array(links, shape=(hidden.size, hidden.size)))
+    size = np.bincount(label, minlength=count) * (4 * np.pi / weights.size)
+    weights[hidden[size[label] <= largest]] = 1.0
+    return weights
 
 
 def upgrade(mask: ArrayLike, nside: int) -> FloatArray:

@@ -25,7 +25,7 @@ from spinsdw.cli.progress import progress
 from spinsdw.harmonics import eb_to_spin, multiply_by_degree, polarisation_factor
 from spinsdw.healpix import UNSEEN, flm_to_map
 from spinsdw.maps_io import read_coefficients, read_map, write_maps
-from spinsdw.masks import galactic_cut
+from spinsdw.masks import galactic_cut, sky_fraction
 from spinsdw.polarisation import _METHODS, EBSeparator, Output
 from spinsdw.simulation import gaussian_flm
 from tests.helpers import assert_close
@@ -251,6 +251,17 @@ def test_column_and_order_of_a_mask_may_be_told(maps, tmp_path, out):
     assert np.array_equal(weights(out, "MASK"), columns["P"])
 
 
+def test_holes_of_a_mask_are_filled_up_to_an_area(maps, tmp_path, out):
+    holed = galactic_cut(NSIDE, np.radians(20))
+    holed[0] = 0
+    mask = write_maps(tmp_path / "mask.fits", {"M": holed}, unit="unknown")
+    area = 1.5 * np.degrees(np.degrees(4 * np.pi / NPIX))
+    told = run_well("separate", maps, "--mask", mask, "--fill-holes", f"{area:.4f}", out=out)
+    assert "holes up to" in told
+    kept = sky_fraction(galactic_cut(NSIDE, np.radians(20)))
+    assert f"{kept:.1%} observed" in told
+
+
 def test_unseen_pixels_are_masked_counted_and_unseen_in_the_result(tmp_path, out):
     q, u = stokes()
     q[[3, 5]], u[[5, 100]] = UNSEEN, UNSEEN
@@ -441,6 +452,7 @@ def test_refusal_names_the_option(options, told, maps, out):
         (["--columns", "a,"], "one column, or two"),
         (["--mask-column", "1,2"], "must be one column"),
         (["--mask", "m.fits", "--galactic-cut", "20"], "cannot both be given"),
+        (["--fill-holes", "3"], "give one with --mask"),
         (["--galactic-cut", "90"], "--galactic-cut"),
         (["--unit", "µK"], "printable ASCII"),
         (["--method", "magic"], "--method"),
@@ -533,7 +545,8 @@ def test_demo_does_what_separate_does_with_the_bundled_files(tmp_path, out):
     run_well("demo", out=out, pictures=True)
     stated = ["--columns", "BESTFIT", "--polconv", "COSMO", "--unit", "mK_RJ"]
     files = (*wmap_synchrotron_paths(), "--mask", wmap_mask_path())
-    run_well("separate", *files, *stated, out=tmp_path / "again", pictures=True)
+    holes = ("--fill-holes", "100")
+    run_well("separate", *files, *stated, *holes, out=tmp_path / "again", pictures=True)
     assert np.array_equal(eb_maps(out), eb_maps(tmp_path / "again"))
     assert {path.name for path in out.iterdir()} >= set(PICTURES)
 

@@ -15,6 +15,7 @@ from spinsdw.masks import (
     check_mask,
     degrade,
     distance_to_edge,
+    fill_holes,
     galactic_cut,
     sky_fraction,
     taper,
@@ -242,3 +243,25 @@ def test_the_check_of_masks_is_one_function():
     from spinsdw import healpix
 
     assert check_mask is healpix.check_mask
+
+
+def test_filling_holes_keeps_the_large_one_and_fills_the_small():
+    """fill_holes(cut with small holes) = cut, up to the stated solid angle only."""
+    cut = galactic_cut(16, np.radians(15))
+    holed = cut.copy()
+    one_pixel = 4 * np.pi / cut.size
+    holed[[0, 100, 101, 400]] = 0
+    np.testing.assert_array_equal(fill_holes(holed, 3 * one_pixel), cut)
+    kept = fill_holes(holed, 1.5 * one_pixel)
+    np.testing.assert_array_equal(np.flatnonzero(cut - kept), [100, 101])
+
+
+def test_filling_holes_leaves_an_apodised_edge_alone():
+    edge = apodise(galactic_cut(8, np.radians(20)), np.radians(20))
+    np.testing.assert_array_equal(fill_holes(edge, 0.1), edge)
+
+
+@pytest.mark.parametrize("largest", [0.0, -1.0, np.nan, np.inf])
+def test_holes_to_fill_have_a_positive_size(largest):
+    with pytest.raises(ParameterError, match=r"largest=.* must be a solid angle above 0"):
+        fill_holes(np.ones(12), largest)

@@ -116,6 +116,12 @@ _mask_options = _decorate(
         metavar="DEG",
         help="Mask latitudes below this instead.",
     ),
+    click.option(
+        "--fill-holes",
+        type=click.FloatRange(0, min_open=True),
+        metavar="DEG2",
+        help="Observe again what the mask hides in holes up to this area.",
+    ),
 )
 _method_options = _decorate(
     click.option("--bandlimit", type=int, help="Degrees are below it [2 nside + 1]."),
@@ -175,6 +181,9 @@ def separate(qfile: str, ufile: str | None, **options: Any) -> None:
     if options["mask"] is not None and options["galactic_cut"] is not None:
         msg = "--mask and --galactic-cut cannot both be given; cut the mask itself."
         raise click.UsageError(msg)
+    if options["fill_holes"] is not None and options["mask"] is None:
+        msg = "--fill-holes is about a mask; give one with --mask."
+        raise click.UsageError(msg)
     if len(options["mask_column"]) != 1:
         msg = "--mask-column must be one column."
         raise click.UsageError(msg)
@@ -188,6 +197,7 @@ def separate(qfile: str, ufile: str | None, **options: Any) -> None:
         column=options["mask_column"][0],
         ordering=options["mask_ordering"],
         galactic_cut=options["galactic_cut"],
+        fill_holes=options["fill_holes"],
     )
     names = "bandlimit method directions dilation lowest_scale taper output threads"
     given = {name: options[name] for name in names.split() if options[name] is not None}
@@ -211,7 +221,8 @@ def demo(threads: int | None, **options: Any) -> None:
         unit="mK_RJ",
         coordinates="G",
     )
-    mask = MaskRequest(path=str(wmap_mask_path()))
+    # The holes at point sources do not matter to a diffuse foreground; the galactic part does.
+    mask = MaskRequest(path=str(wmap_mask_path()), fill_holes=100.0)
     wanted = SeparationRequest(
         maps, mask, _output(options), {"threads": threads}, remark=SYNCHROTRON
     )

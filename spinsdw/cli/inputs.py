@@ -13,7 +13,7 @@ from spinsdw.errors import FileFormatError, ParameterError
 from spinsdw.healpix import clean_polarisation, nside_of
 from spinsdw.maps_io import PolarisationMaps, read_map, read_mask, read_polarisation
 from spinsdw.maps_io.layout import UNKNOWN
-from spinsdw.masks import degrade, galactic_cut, sky_fraction, upgrade
+from spinsdw.masks import degrade, fill_holes, galactic_cut, sky_fraction, upgrade
 
 __all__ = ["Inputs", "read_inputs"]
 
@@ -134,8 +134,12 @@ def _mask(
     mask = read_mask(
         wanted.path, column=wanted.column, ordering=wanted.ordering, max_memory=max_memory
     )
+    name = _file_name(wanted.path)
+    if wanted.fill_holes is not None:
+        mask = fill_holes(mask, wanted.fill_holes * np.radians(1) ** 2)
+        name = f"{name}, holes up to {wanted.fill_holes:g} square degrees filled"
     resized, change = _resized(mask, maps.nside)
-    return resized, f"{_file_name(wanted.path)}, {change}"
+    return resized, f"{name}, {change}"
 
 
 def _check_frame(wanted: MaskRequest, maps: PolarisationMaps, max_memory: int | None) -> None:

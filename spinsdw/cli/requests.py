@@ -39,12 +39,16 @@ class MapRequest:
 
 @dataclass(frozen=True)
 class MaskRequest:
-    """Which sky to use: a mask's file, a cut in degrees of galactic latitude, or all of it."""
+    """Which sky to use: a mask's file, a cut in degrees of galactic latitude, or all of it.
+
+    ``fill_holes`` is the area in square degrees up to which holes of the file's mask are filled.
+    """
 
     path: str | None = None
     column: Column = 0
     ordering: str | None = None
     galactic_cut: float | None = None
+    fill_holes: float | None = None
 
 
 @dataclass(frozen=True)
