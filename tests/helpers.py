@@ -107,15 +107,22 @@ def small_d(el, n, angles):
     return ((phases * vectors[el + n].conj()) @ vectors.T).real
 
 
-def direct_map(flm, spin, colatitudes, longitudes):
-    """sum_lm f_lm (-1)^s sqrt((2l+1)/4pi) d^l_{m,-s} e^{i m phi}, shape (..., rings, phi)."""
-    total = 0.0
-    for el in range(math.isqrt(flm.shape[-1])):
+def direct_columns(flm, spin, colatitudes):
+    """F_m = (-1)^s sum_l sqrt((2l+1)/4pi) f_lm d^l_{m,-s}, shape (..., rings, m = 1-L..L-1)."""
+    bandlimit = math.isqrt(flm.shape[-1])
+    columns = np.zeros((*flm.shape[:-1], len(colatitudes), 2 * bandlimit - 1), dtype=complex)
+    for el in range(bandlimit):
         factor = (-1.0) ** spin * np.sqrt((2 * el + 1) / (4 * np.pi))
-        phases = np.exp(1j * np.outer(np.arange(-el, el + 1), longitudes))
-        row = flm[..., None, el**2 : (el + 1) ** 2]
-        total = total + factor * ((row * small_d(el, -spin, colatitudes)) @ phases)
-    return total
+        row = factor * flm[..., None, el**2 : (el + 1) ** 2]
+        columns[..., bandlimit - 1 - el : bandlimit + el] += row * small_d(el, -spin, colatitudes)
+    return columns
+
+
+def direct_map(flm, spin, colatitudes, longitudes):
+    """sum_m F_m(theta) e^{i m phi}, shape (..., rings, phi)."""
+    columns = direct_columns(flm, spin, colatitudes)
+    m = np.arange(columns.shape[-1]) - columns.shape[-1] // 2
+    return columns @ np.exp(1j * np.outer(m, longitudes))
 
 
 def direct_function(coefficients, orders, angles):
