@@ -18,7 +18,7 @@ from spinsdw.separation.skies import sky_of
 from spinsdw.simulation import simulate_eb, simulate_qu
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import EPS, assert_close
+from tests.helpers import EPS, assert_close, needs_compiler
 
 L, NSIDE, NPIX = 16, 8, 768
 SHAPES = {"mw": (16, 31), "mwss": (17, 32), "healpix": (NPIX,)}
@@ -553,6 +553,7 @@ def test_bands_of_another_separators_maps_are_refused():
 # Leakage
 
 
+@needs_compiler
 def test_less_e_leaks_into_b_than_through_a_transform_of_the_masked_map():
     """rms of B over R, 3 degrees and more inside a galactic cut, of a sky that has E only"""
     hp = pytest.importorskip("healpy")
