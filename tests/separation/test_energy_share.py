@@ -14,7 +14,7 @@ from spinsdw.separation.energy_share import energy_shares, wavelet_energy
 from spinsdw.separation.skies import GridSky, HealpixSky
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import EPS, assert_close, random_flm
+from tests.helpers import EPS, assert_close, needs_compiler, random_flm
 
 L = 8
 
@@ -146,6 +146,26 @@ def test_energy_is_the_squared_modulus(spin):
     values = spin_harmonics(L, spin, theta, phi) @ flm
     found = spin_harmonics(2 * L - 1, 0, theta, phi) @ energy
     assert_close(found, np.abs(values) ** 2, ulps=64 * L)
+
+
+@needs_compiler
+@pytest.mark.parametrize("scale", [4, 5, 6])
+def test_energy_is_the_squared_modulus_at_bandlimits_that_round(scale):
+    """|psi|^2 again, at D = 2 L_j - 1 = 63, 127 and 255
+
+    A transform that took a frequency for n * (1 / n) was wrong by more than the energy at
+    127 and 255, and right at the sizes above and below.
+    """
+    psi, _, _ = wavelet_of(SpinWaveletTransform(128, 2), scale)
+    size = psi.shape[1]
+    energy = wavelet_energy(psi, (0,), 2, threads=None)
+    # Two values that need no transform: the integral, and the pole, where spin 2 vanishes.
+    assert_close(energy[0] * np.sqrt(4 * np.pi), np.sum(np.abs(psi) ** 2), ulps=64 * size)
+    el = np.arange(2 * size - 1)
+    at_pole = np.sum(np.sqrt((2 * el + 1) / (4 * np.pi)) * energy[el**2 + el])
+    assert abs(at_pole) < 64 * size * EPS * abs(energy[0]) * size
+    # Order 0 is all there is.
+    assert np.max(np.abs(np.delete(energy, el**2 + el))) < 64 * size * EPS * abs(energy[0])
 
 
 @pytest.mark.parametrize("directions", [1, 2, 3, 4, 5])
