@@ -83,7 +83,9 @@ def exact_small_d(el, m, n, cosine):
     square = total**2 * math.prod(math.factorial(el + i) for i in (m, -m, n, -n))
     if (m - n) % 2:
         square *= c2 * s2
-    return math.copysign(math.sqrt(square), total)
+    # Scaled by a power of 4, for its square may be below the range of floats.
+    power = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
+    return math.copysign(math.ldexp(math.sqrt(square / Fraction(4) ** power), power), total)
 
 
 @functools.cache
