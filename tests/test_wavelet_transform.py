@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError
 
@@ -467,6 +469,16 @@ def test_objects_describe_themselves_and_are_frozen():
     assert_close(transform.orientations, np.arange(3) * np.pi / 3, ulps=1)
     with pytest.raises(FrozenInstanceError):
         transform.spin = 0
+
+
+@pytest.mark.parametrize("make_copy", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_copies_and_pickles_transform_alike(make_copy):
+    """So that other processes can have them, before their first use and after."""
+    transform, flm = SpinWaveletTransform(8, 2, 3), random_flm(8, 2)
+    unused = make_copy(transform)
+    desired = transform.analysis_harmonic(flm)
+    for one in (unused, make_copy(transform)):
+        assert_equal(one.analysis_harmonic(flm), desired)
 
 
 def test_coefficients_know_what_made_them():
