@@ -49,9 +49,9 @@ class SeparationInfo:
     scales : tuple of int
         The wavelet scales.
     sky_fraction : float
-        Mean of the mask.
+        Mean of the mask over the sphere.
     kept_fraction : dict
-        Mean weight of the coefficients of each scale, and of the scaling part.
+        Mean weight over the sphere of the coefficients of each scale, and of the scaling part.
     fit : HealpixFit or None
         How well harmonic coefficients fit a HEALPix map; None on grids, where they are exact.
     seconds : dict of str to float
@@ -177,7 +177,6 @@ class EBSeparator:
             values = np.asarray(mask)
             sky = sky_of(values, bandlimit, name="mask", threads=threads)
             weights = check_mask(values, values.shape)
-            weights = nested_to_ring(weights) if nest and weights.ndim == 1 else weights
             weights.setflags(write=False)
             bandlimit = sky.bandlimit
         bandlimit = check_bandlimit(bandlimit)
@@ -190,6 +189,8 @@ class EBSeparator:
         parameters = (*settings, float(taper), output, bool(nest), threads)
         for item, value in zip(fields(self), parameters, strict=True):
             object.__setattr__(self, item.name, value)
+        # What each sky costs to prepare, kept with the separator.
+        object.__setattr__(self, "_methods", {})
         # Checks directions, dilation, lowest_scale and threads now rather than at the first map.
         self._transform("mw")
 
@@ -204,25 +205,29 @@ class EBSeparator:
             threads=self.threads,
         )
 
-    @functools.lru_cache(maxsize=4)  # noqa: B019 - a separator keeps what its mask costs
+    @functools.cached_property
+    def _ring_mask(self) -> Array | None:
+        """The mask in ring order, as everything inside works."""
+        return None if self.mask is None else self._in_rings(self.mask)
+
     def _prepared(self, sky: HealpixSky | GridSky) -> PseudoMethod:
-        transform = self._transform(sky.sampling_name)
-        return _METHODS[self.method](transform, sky, self.mask, self.taper)
+        methods: dict[HealpixSky | GridSky, PseudoMethod] = self._methods  # type: ignore[attr-defined]
+        if sky not in methods:
+            transform = self._transform(sky.sampling_name)
+            methods[sky] = _METHODS[self.method](transform, sky, self._ring_mask, self.taper)
+        return methods[sky]
 
     def _sky_of(self, q: Array) -> HealpixSky | GridSky:
-        sky = sky_of(q, self.bandlimit, name="q", threads=self.threads)
         if self.mask is not None and q.shape != self.mask.shape:
             msg = f"q has shape {q.shape} but the mask {self.mask.shape}; they must be alike."
             raise ShapeError(msg)
-        return sky
+        return sky_of(q, self.bandlimit, name="q", threads=self.threads)
 
     def _observed(self, q: Array, u: Array) -> tuple[Array, Array]:
         """Return Q and U in ring order, zero and finite where masked."""
-        q, u = np.asarray(q), np.asarray(u)
-        if self.nest and q.ndim == 1 and q.shape == u.shape:
-            q, u = nested_to_ring(q), nested_to_ring(u)
-        cleaned_q, cleaned_u, found = clean_polarisation(q, u, self.mask)
-        given = np.ones(q.shape) if self.mask is None else self.mask
+        q, u = self._in_rings(q), self._in_rings(u)
+        cleaned_q, cleaned_u, found = clean_polarisation(q, u, self._ring_mask)
+        given = np.ones(q.shape) if self._ring_mask is None else self._ring_mask
         lost = np.count_nonzero((found == 0) & (given > 0))
         if lost:
             msg = (
@@ -257,13 +262,18 @@ class EBSeparator:
             If the shape does not fit the bandlimit.
         """
         clock = Clock()
+        q, u = np.asarray(q), np.asarray(u)
+        if q.shape != u.shape:
+            msg = f"q has shape {q.shape} and u {u.shape}, which must be the same."
+            raise ShapeError(msg)
+        sky = self._sky_of(q)
         cleaned_q, cleaned_u = self._observed(q, u)
-        sky = self._sky_of(cleaned_q)
         prepared = self._prepared(sky)
-        keep = prepared.weights
+        kept = prepared.kept_fraction
         clock.stop("mask preparation")
         p = cleaned_q + 1j * cleaned_u
-        plm, fit = sky.polarisation_coefficients(p if self.mask is None else self.mask * p)
+        masked = p if self._ring_mask is None else self._ring_mask * p
+        plm, fit = sky.polarisation_coefficients(masked)
         clock.stop("harmonic analysis")
         coefficients = prepared.apply(prepared.transform.analysis_harmonic(plm))
         clock.stop("wavelet analysis")
@@ -276,8 +286,8 @@ class EBSeparator:
             method=self.method,
             bandlimit=sky.bandlimit,
             scales=prepared.transform.scales,
-            sky_fraction=1.0 if self.mask is None else float(np.mean(self.mask)),
-            kept_fraction={key: float(np.mean(values)) for key, values in keep.items()},
+            sky_fraction=prepared.sky_fraction,
+            kept_fraction=kept,
             fit=fit,
             seconds=clock.seconds,
         )
@@ -308,8 +318,7 @@ class EBSeparator:
         ShapeError
             If the maps are of another separator.
         """
-        observed = nested_to_ring(maps.E) if self.nest and maps.E.ndim == 1 else maps.E
-        sky = self._sky_of(observed)
+        sky = self._sky_of(maps.E)
         transform = self._prepared(sky).transform
         found: dict[int | str, tuple[Array, Array]] = {}
         for key in transform.shapes:
@@ -317,6 +326,9 @@ class EBSeparator:
             eb = sky.scalar_map(self._fields(flm))
             found[key] = self._reordered(eb.real), self._reordered(eb.imag)
         return found
+
+    def _in_rings(self, values: Array) -> Array:
+        return nested_to_ring(values) if self.nest and values.ndim == 1 else values
 
     def _reordered(self, values: Array) -> Array:
         if self.nest and values.ndim == 1:
@@ -337,14 +349,15 @@ class EBSeparator:
         self, prepared: PseudoMethod, coefficients: WaveletCoefficients, shape: tuple[int, ...]
     ) -> tuple[dict[int, Array], Array]:
         transform, sky = prepared.transform, prepared.sky
-        if self.mask is None:
+        if self._ring_mask is None:
             ones = np.ones(shape)
             return {j: ones.copy() for j in transform.scales}, ones
         weights, weight, total = {}, np.zeros(shape), 0.0
         for j in transform.scales:
             weights[j] = position_map(prepared.weights[j].mean(axis=0), transform, j, sky)
-            weights[j] *= self.mask > 0
+            weights[j] *= self._ring_mask > 0
             power = float(np.mean(np.abs(coefficients[j]) ** 2))
             weight += power * weights[j]
             total += power
-        return weights, weight / total if total > 0 else weight
+        # A map without any power is trusted where its mask is.
+        return weights, weight / total if total > 0 else np.mean(list(weights.values()), axis=0)

@@ -118,12 +118,13 @@ class RingEngine:
     symmetric: bool = False
 
     @functools.cached_property
-    def _tables(self) -> tuple[Array, Array]:
-        root = np.sqrt(np.arange(2 * self.bandlimit + 2, dtype=float))
+    def _tables(self) -> tuple[Array, Array, Array]:
+        numbers = np.arange(2 * self.bandlimit + 2, dtype=float)
+        inverse = np.divide(1.0, numbers, out=np.zeros_like(numbers), where=numbers > 0)
         # binom(2M, M) / 4**M, up to M = L for the orders above m.
         index = np.arange(1, self.bandlimit + 1, dtype=float)
         central = np.concatenate([[1.0], np.cumprod((2 * index - 1) / (2 * index))])
-        return root, central
+        return np.sqrt(numbers), central, inverse
 
     def _padded_rings(self, padding: int) -> tuple[Array, ...]:
         half = self.colatitudes / 2

@@ -29,52 +29,61 @@ def mix_columns(mixing, first_m, stop_m, columns):
 
 
 @kernel
+def _mix_column(mixing, i, columns, m, mixed):
+    """Fill mixed = sum_k mixing[i, k] columns[k, m]; zero for m = -1."""
+    mixed[:] = 0.0
+    if m >= 0:
+        for k in range(mixing.shape[1]):
+            factor = mixing[i, k]
+            source = columns[k, m]
+            for t in range(mixed.size):
+                mixed[t] += factor * source[t]
+
+
+@kernel
 def fill_circles(columns, mixing, even, odd, parities, offset, circles):
     """Put an even-m and an odd-m column on one full circle: they have opposite parity in theta.
 
     circles[i, j] holds sum_k mixing[i, k] of columns even[j] and odd[j] (-1: none) of row k. On it
     F_m(-theta) = (-1)^(m + n) F_m(theta); parities[i] is that sign for even m. Ring t mirrors to
-    ``size - offset - t`` modulo size: offset 1 on MW, 0 on MWSS.
+    ``size - offset - t``: offset 1 on MW, whose last ring is a pole, 0 on MWSS, whose first is too.
     """
     size, n_rings = circles.shape[2], columns.shape[2]
+    first = np.empty(n_rings, dtype=np.complex128)
+    second = np.empty(n_rings, dtype=np.complex128)
     for i in range(circles.shape[0]):
         parity = parities[i]
         for j in range(circles.shape[1]):
             out = circles[i, j]
-            for t in range(n_rings):
-                first, second = 0.0j, 0.0j
-                for k in range(mixing.shape[1]):
-                    factor = mixing[i, k]
-                    if even[j] >= 0:
-                        first += factor * columns[k, even[j], t]
-                    if odd[j] >= 0:
-                        second += factor * columns[k, odd[j], t]
-                mirror = (size - offset - t) % size
-                if mirror == t:
-                    # A pole: the odd-parity function vanishes there.
-                    out[t] = first if parity > 0 else second
-                else:
-                    out[t] = first + second
-                    out[mirror] = parity * (first - second)
+            _mix_column(mixing, i, columns, even[j], first)
+            _mix_column(mixing, i, columns, odd[j], second)
+            for t in range(1 - offset, n_rings - 1):
+                out[t] = first[t] + second[t]
+                out[size - offset - t] = parity * (first[t] - second[t])
+            # At a pole the odd-parity function vanishes.
+            pole = first if parity > 0 else second
+            out[n_rings - 1] = pole[n_rings - 1]
+            if offset == 0:
+                out[0] = pole[0]
 
 
 @kernel
 def fold_circles(circles, even, odd, parities, offset, columns):
     """Transpose of `fill_circles` without mixing: circles[i] goes to row i of the columns."""
     size, n_rings = circles.shape[2], columns.shape[2]
+    spare = np.empty(n_rings, dtype=np.complex128)
     for i in range(circles.shape[0]):
         parity = parities[i]
         for j in range(circles.shape[1]):
             values = circles[i, j]
-            for t in range(n_rings):
-                mirror = (size - offset - t) % size
-                if mirror == t:
-                    first = values[t] if parity > 0 else 0.0j
-                    second = 0.0j if parity > 0 else values[t]
-                else:
-                    first = values[t] + parity * values[mirror]
-                    second = values[t] - parity * values[mirror]
+            first = columns[i, even[j]] if even[j] >= 0 else spare
+            for t in range(1 - offset, n_rings - 1):
+                first[t] = values[t] + parity * values[size - offset - t]
+            second = columns[i, odd[j]] if odd[j] >= 0 else spare
+            for t in range(1 - offset, n_rings - 1):
+                second[t] = values[t] - parity * values[size - offset - t]
+            for t in (0, n_rings - 1) if offset == 0 else (n_rings - 1, n_rings - 1):
                 if even[j] >= 0:
-                    columns[i, even[j], t] = first
+                    columns[i, even[j], t] = values[t] if parity > 0 else 0.0j
                 if odd[j] >= 0:
-                    columns[i, odd[j], t] = second
+                    columns[i, odd[j], t] = 0.0j if parity > 0 else values[t]

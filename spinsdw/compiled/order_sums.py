@@ -83,25 +83,34 @@ def _is_active(run, slot, m, sides):
 
 
 @kernel
-def _fill_coefficients(run, slot, k, columns, m, L, lowest, flm, weights, scale, c):
+def _gather(m, L, flm, gathered):
+    """gathered[source, side, l] = f_{l, +-m}, next to each other for neighbouring degrees."""
+    for source in range(flm.shape[0]):
+        for side in range(gathered.shape[1]):
+            signed_m = m if side == 0 else -m
+            for el in range(m, L):
+                gathered[source, side, el] = flm[source, el * el + el + signed_m]
+
+
+@kernel
+def _fill_coefficients(run, slot, k, columns, m, L, lowest, gathered, weights, scale, c):
     """c[l, k] + i c[l, k + 1] = sign_l scale_l weight_l f_{l, sigma m} for one series."""
     n, i, sigma, mirrored = run[0], run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
     sign, alternates = _series_sign(sigma, mirrored, m, n)
-    source = i if flm.shape[0] > 1 else 0
+    source = gathered[i if gathered.shape[0] > 1 else 0, 0 if sigma > 0 else 1]
+    weight = weights[i]
     first = max(m, abs(n))
-    signed_m = sigma * m
     for el in range(first, min(lowest, L)):
         c[el * columns + k] = 0.0
         c[el * columns + k + 1] = 0.0
     for el in range(max(first, lowest), L):
-        factor = sign * scale[el]
-        if alternates and el & 1:
-            factor = -factor
-        value = factor * weights[i, el] * flm[source, el * el + el + signed_m]
+        factor = -sign * scale[el] if alternates and el & 1 else sign * scale[el]
+        value = factor * weight[el] * source[el]
         c[el * columns + k] = value.real
         c[el * columns + k + 1] = value.imag
-    for place in range(L * columns, (L + PADDING) * columns):
-        c[place] = 0.0
+    for el in range(L, L + PADDING):
+        c[el * columns + k] = 0.0
+        c[el * columns + k + 1] = 0.0
 
 
 @kernel
@@ -121,23 +130,6 @@ def _shift_argument(first, L, a, b, north, south):
 
 
 @kernel
-def _start_block(start, norm, norm_power, powers, state):
-    """Set the recursion of rings start .. start + RINGS to its first degree."""
-    stop = start + RINGS
-    fill_start(
-        norm,
-        norm_power,
-        powers[0, start:stop],
-        powers[1, start:stop],
-        powers[2, start:stop],
-        powers[3, start:stop],
-        state[0],
-        state[1],
-        state[2],
-    )
-
-
-@kernel
 def _store_block(run, slot, k, start, sums, series):
     target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
     for r in range(RINGS):
@@ -146,22 +138,49 @@ def _store_block(run, slot, k, start, sums, series):
 
 
 @kernel
-def _mix_series(m, n_rings, mixing, series, columns):
+def _clear(run, slot, low, high, series):
+    """Set to zero what a run does not compute: rings before ``low`` and from ``high`` on."""
+    target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
+    for part in range(2):
+        target[part, :low] = 0.0
+        target[part, high:] = 0.0
+
+
+@kernel
+def _mix_series(m, n_rings, mixing, series, mixed, columns):
     """columns[k, +-m, ring] = sum_i mixing[k, i] series[i]; a mirrored ring counts from the end."""
     n_out, n_orders = mixing.shape
     n_m, total = columns.shape[1], columns.shape[2]
     for half in range(series.shape[2]):
         for side in range(2 if m > 0 and series.shape[1] > 1 else 1):
-            place = m if side == 0 else n_m - m
             for k in range(n_out):
-                out = columns[k, place]
+                out = columns[k, m if side == 0 else n_m - m]
+                mixed[:] = 0.0
                 for i in range(n_orders):
-                    factor = mixing[k, i]
+                    p, q = mixing[k, i].real, mixing[k, i].imag
                     real, imaginary = series[i, side, half, 0], series[i, side, half, 1]
                     for r in range(n_rings):
-                        ring = r if half == 0 else total - 1 - r
-                        value = factor * complex(real[r], imaginary[r])
-                        out[ring] = value if i == 0 else out[ring] + value
+                        mixed[0, r] += p * real[r] - q * imaginary[r]
+                        mixed[1, r] += p * imaginary[r] + q * real[r]
+                if half == 0:
+                    for r in range(n_rings):
+                        out[r] = complex(mixed[0, r], mixed[1, r])
+                else:
+                    for r in range(n_rings):
+                        out[total - 1 - r] = complex(mixed[0, r], mixed[1, r])
+
+
+@kernel
+def _prepare_recursion(m, n, L, is_opposite, tables, recursion):
+    """Fill a, b and both shifted arguments; ``is_opposite`` if -n was the order before."""
+    a, b, scale, north, south = recursion
+    first = max(m, abs(n))
+    if is_opposite:
+        for el in range(first, L):
+            b[el] = -b[el]
+    else:
+        fill_recursion(m, n, L, tables[0], tables[2], a, b, scale)
+    _shift_argument(first, L, a, b, north, south)
 
 
 @kernel
@@ -172,49 +191,65 @@ def fill_columns(
 
     flm: (1 or orders, L*L); weights: (orders, L) complex; mixing: (outputs, orders) complex;
     rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows: (2, L)
-    first and last ring that matter at each m; tables: (sqrt(k), central binomials); columns:
+    first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k); columns:
     (outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
     """
-    root, central = tables
     n_orders, n_runs = weights.shape[0], runs.shape[0]
     mirrored = max(runs[:, 3].max(), runs[:, 6].max())
     padded = rings[0].size
-    a, b, scale = np.empty(L + PADDING), np.empty(L), np.empty(L + 1)
-    north, south = np.empty(L + PADDING), np.empty(L + PADDING)
-    c, sums = np.empty(4 * (L + PADDING)), np.empty(4 * RINGS)
-    state = np.empty((3, RINGS))
+    recursion = (
+        np.empty(L + PADDING),
+        np.empty(L),
+        np.empty(L + 1),
+        np.empty(L + PADDING),
+        np.empty(L + PADDING),
+    )
+    c, sums, state = np.empty(4 * (L + PADDING)), np.empty(4 * RINGS), np.empty((4, RINGS))
     powers = np.empty((n_runs, 4, padded))
+    gathered = np.empty((flm.shape[0], sides, L), dtype=np.complex128)
     series = np.zeros((n_orders, sides, mirrored + 1, 2, padded))
+    mixed = np.empty((2, padded))
     for m in range(first_m, stop_m):
-        series[:] = 0.0
+        _gather(m, L, flm, gathered)
+        low, high = windows[0, m], windows[1, m]
+        covered = low + (high - low + RINGS - 1) // RINGS * RINGS if high > low else low
+        filled = 2 * L
         for j in range(n_runs):
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
             _prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
-            has_one, has_two = _is_active(run, 0, m, sides), _is_active(run, 1, m, sides)
-            if first >= L or not (has_one or has_two):
+            is_empty = first >= L
+            columns_used = 0
+            for slot in range(2):
+                if _is_active(run, slot, m, sides):
+                    columns_used += 2
+                    _clear(run, slot, padded if is_empty else low, covered, series)
+            if columns_used == 0 or is_empty:
                 continue
-            columns_used = 4 if has_one and has_two else 2
-            fill_recursion(m, n, L, root, a, b, scale)
-            _shift_argument(first, L, a, b, north, south)
+            _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
+            filled = n
+            a, scale = recursion[0], recursion[2]
             for slot in range(2):
                 if _is_active(run, slot, m, sides):
                     k = columns_used - 2 if slot == 1 else 0
                     _fill_coefficients(
-                        run, slot, k, columns_used, m, L, lowest, flm, weights, scale, c
+                        run, slot, k, columns_used, m, L, lowest, gathered, weights, scale, c
                     )
-            norm, norm_power = _signed_norm(m, n, central)
-            for start in range(windows[0, m], windows[1, m], RINGS):
-                _start_block(start, norm, norm_power, powers[j], state)
+            norm, norm_power = _signed_norm(m, n, tables[1])
+            for start in range(low, high, RINGS):
+                inside = fill_start(
+                    norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
+                )
                 is_north = rings[2][start] < 1.0
                 x = (rings[3] if is_north else rings[1])[start : start + RINGS]
-                shift = north if is_north else south
+                shift = recursion[3] if is_north else recursion[4]
                 sum_block(
                     first,
                     lowest,
                     L,
                     columns_used,
+                    inside,
                     a,
                     shift,
                     c,
@@ -224,11 +259,11 @@ def fill_columns(
                     state[2],
                     sums,
                 )
-                if has_one:
-                    _store_block(run, 0, 0, start, sums, series)
-                if has_two:
-                    _store_block(run, 1, columns_used - 2, start, sums, series)
-        _mix_series(m, padded - RINGS, mixing, series, columns)
+                for slot in range(2):
+                    if _is_active(run, slot, m, sides):
+                        k = columns_used - 2 if slot == 1 else 0
+                        _store_block(run, slot, k, start, sums, series)
+        _mix_series(m, padded - RINGS, mixing, series, mixed, columns)
 
 
 @kernel
@@ -274,44 +309,52 @@ def add_columns_to_harmonics(
     columns: (at least orders, n_m, all rings); flm: (1 or orders, L*L); the rest as in
     `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
     """
-    root, central = tables
     n_runs = runs.shape[0]
     padded = rings[0].size
-    a, b, scale = np.empty(L + PADDING), np.empty(L), np.empty(L + 1)
-    north, south = np.empty(L + PADDING), np.empty(L + PADDING)
+    recursion = (
+        np.empty(L + PADDING),
+        np.empty(L),
+        np.empty(L + 1),
+        np.empty(L + PADDING),
+        np.empty(L + PADDING),
+    )
     sums = np.empty(4 * WIDTH * (L + PADDING))
-    g, masked = np.empty(4 * RINGS), np.empty(4 * RINGS)
-    state = np.empty((3, RINGS))
+    g, masked, state = np.empty(4 * RINGS), np.empty(4 * RINGS), np.empty((4, RINGS))
     powers = np.empty((n_runs, 4, padded))
     for m in range(first_m, stop_m):
+        filled = 2 * L
         for j in range(n_runs):
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
             _prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
-            has_one, has_two = _is_active(run, 0, m, sides), _is_active(run, 1, m, sides)
-            if first >= L or not (has_one or has_two):
+            columns_used = 0
+            for slot in range(2):
+                columns_used += 2 if _is_active(run, slot, m, sides) else 0
+            if columns_used == 0 or first >= L:
                 continue
-            columns_used = 4 if has_one and has_two else 2
-            fill_recursion(m, n, L, root, a, b, scale)
-            _shift_argument(first, L, a, b, north, south)
-            for place in range(first * columns_used * WIDTH, (L + PADDING) * columns_used * WIDTH):
-                sums[place] = 0.0
-            norm, norm_power = _signed_norm(m, n, central)
+            _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
+            filled = n
+            a, scale = recursion[0], recursion[2]
+            sums[first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
+            norm, norm_power = _signed_norm(m, n, tables[1])
             for start in range(windows[0, m], windows[1, m], RINGS):
-                _start_block(start, norm, norm_power, powers[j], state)
+                inside = fill_start(
+                    norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
+                )
                 for slot in range(2):
                     if _is_active(run, slot, m, sides):
                         k = columns_used - 2 if slot == 1 else 0
                         _load_block(run, slot, k, m, start, padded - RINGS, columns, g)
                 is_north = rings[2][start] < 1.0
                 x = (rings[3] if is_north else rings[1])[start : start + RINGS]
-                shift = north if is_north else south
+                shift = recursion[3] if is_north else recursion[4]
                 add_block_to_degrees(
                     first,
                     lowest,
                     L,
                     columns_used,
+                    inside,
                     a,
                     shift,
                     g,

@@ -49,12 +49,14 @@ def _next_pairs(el, lowest, L, is_inside, is_silent):
 
 
 @kernel
-def sum_block(first, lowest, L, columns, a, b, c, x, before, now, scale, sums):
-    """sums[k, r] = sum_{l=first}^{L-1} c[l, k] u_l(x_r); c is zero below ``lowest``."""
+def sum_block(first, lowest, L, columns, inside, a, b, c, x, before, now, scale, sums):
+    """sums[k, r] = sum_{l=first}^{L-1} c[l, k] u_l(x_r); c is zero below ``lowest``.
+
+    ``inside`` counts the rings in range at the first degree.
+    """
     for i in range(columns * RINGS):
         sums[i] = 0.0
     el = first
-    inside = rescale(before, now, scale)
     while el < L:
         is_inside = inside == RINGS
         is_silent = inside == 0 or el + PADDING <= lowest
@@ -74,10 +76,14 @@ def sum_block(first, lowest, L, columns, a, b, c, x, before, now, scale, sums):
 
 
 @kernel
-def add_block_to_degrees(first, lowest, L, columns, a, b, g, masked, x, before, now, scale, sums):
-    """sums[l, k, lane] += sum_r g[k, r] u_l(x_r) over the rings of each lane, lowest <= l < L."""
+def add_block_to_degrees(
+    first, lowest, L, columns, inside, a, b, g, masked, x, before, now, scale, sums
+):
+    """sums[l, k, lane] += sum_r g[k, r] u_l(x_r) over the rings of each lane, lowest <= l < L.
+
+    ``inside`` counts the rings in range at the first degree.
+    """
     el = first
-    inside = rescale(before, now, scale)
     _mask_outside(scale, columns, g, masked)
     while el < L:
         is_inside = inside == RINGS

@@ -38,27 +38,30 @@ PADDING = 16
 _STEP = 800
 _FLOOR = -160
 _SHRINK = 2.0**-_STEP
+_SMALLEST = 2.0**_FLOOR
 _LIMIT = 2.0 ** (_STEP + _FLOOR)
 _RENORM = 2.0**256
 _UNRENORM = 2.0**-256
 
 
 @kernel
-def fill_recursion(m, n, L, root, a, b, scale):
-    """Fill a_l, b_l, scale_l for l = max(m, |n|) .. L - 1; root[k] = sqrt(k), k < 2 L."""
+def fill_recursion(m, n, L, root, inverse, a, b, scale):
+    """Fill a_l, b_l, scale_l, max(m, |n|) <= l < L, from root[k] = sqrt(k), inverse[k] = 1 / k."""
     n_abs = abs(n)
     first = max(m, n_abs)
     scale[first] = 1.0
     w, before, mn = 1.0, 1.0, float(m) * float(n)
     for el in range(first, L):
-        # The product under the root of w_{l+1}, each factor exact to rounding.
         w_next = (
-            root[el + 1 - m] * root[el + 1 + m] * root[el + 1 - n_abs] * root[el + 1 + n_abs]
-        ) / (el + 1.0)
+            (root[el + 1 - m] * root[el + 1 + m])
+            * (root[el + 1 - n_abs] * root[el + 1 + n_abs])
+            * inverse[el + 1]
+        )
         now = scale[el]
         following = 1.0 if el == first else before * w / w_next
+        # From the scales as they were rounded: so their errors are no errors of the recursion.
         a[el] = (2 * el + 1) * now / (w_next * following)
-        b[el] = -a[el] * mn / (el * (el + 1.0)) if el > 0 else 0.0
+        b[el] = -a[el] * mn * inverse[el] * inverse[el + 1]
         scale[el + 1] = following
         before, w = now, w_next
 
@@ -112,23 +115,42 @@ def start_norm(M, K, central):
 
 
 @kernel
-def fill_start(norm, norm_power, sines, sine_powers, ones, one_powers, before, now, scale):
-    """Set u_{l0-1} = 0, u_{l0} and the exponents of a block of rings."""
+def _fill_small_start(power, before, now, scale):
+    """Give rings their exponents: now holds the mantissas, the true values are now 2**power."""
+    inside = 0
     for r in range(now.size):
         before[r] = 0.0
         scale[r] = 0.0
-        value = norm * sines[r] * ones[r]
-        if value == 0.0:
-            # A pole, where d^l0 is exactly zero: so is every later degree.
-            now[r] = 0.0
-        else:
-            mantissa, exponent = math.frexp(value)
-            exponent += int(norm_power + sine_powers[r] + one_powers[r])
+        # A pole, where d^l0 is exactly zero, stays zero at every later degree.
+        if now[r] != 0.0:
+            mantissa, exponent = math.frexp(now[r])
+            exponent += int(power[r])
             if exponent < _FLOOR:
                 step = math.floor((exponent - _FLOOR) / _STEP)
                 scale[r] = step
                 exponent -= _STEP * int(step)
             now[r] = math.ldexp(mantissa, exponent)
+        inside += 1 if scale[r] == 0.0 else 0
+    return inside
+
+
+@kernel
+def fill_start(norm, norm_power, powers, first, before, now, scale, power):
+    """Set u_{l0-1} = 0, u_{l0} and the exponents of the rings from ``first`` on.
+
+    powers: mantissas and exponents of sin(theta)^(M - |K|), then of (1 +- cos(theta))^|K|.
+    Returns how many rings are in range.
+    """
+    small = 0
+    for r in range(now.size):
+        value = norm * powers[0, first + r] * powers[2, first + r]
+        exponent = norm_power + powers[1, first + r] + powers[3, first + r]
+        now[r] = value
+        power[r] = exponent
+        before[r] = 0.0
+        scale[r] = 0.0
+        small += 1 if abs(value) < _SMALLEST or exponent != 0.0 else 0
+    return _fill_small_start(power, before, now, scale) if small > 0 else now.size
 
 
 @kernel

@@ -18,6 +18,7 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.masks import taper
 from spinsdw.separation.energy_share import energy_shares
 from spinsdw.separation.skies import GridSky, HealpixSky
+from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
 __all__ = ["PseudoMethod"]
@@ -58,6 +59,32 @@ class PseudoMethod:
     def weights(self) -> dict[int | str, Array]:
         """1 where a wavelet sees no hole, falling smoothly to 0 at ``largest_share``."""
         return {key: 1.0 - taper(share / self.largest_share) for key, share in self.shares.items()}
+
+    @property
+    def sky_fraction(self) -> float:
+        """Mean of the mask over the sphere."""
+        if self.mask is None:
+            return 1.0
+        return float(self.sky.integrals(self.mask, 1)[0].real / np.sqrt(4 * np.pi))
+
+    @functools.cached_property
+    def kept_fraction(self) -> dict[int | str, float]:
+        """Mean of the weights over the sphere and the orientations, for each scale."""
+        if self.mask is None:
+            return dict.fromkeys(self.weights, 1.0)
+        return {
+            key: self._sphere_mean(values.reshape(-1, *values.shape[-2:]).mean(axis=0))
+            for key, values in self.weights.items()
+        }
+
+    def _sphere_mean(self, values: Array) -> float:
+        # Samples crowd at the poles: a plain mean would be one of the poles.
+        bandlimit = values.shape[1] // 2 if self.sky.sampling_name == "mwss" else values.shape[0]
+        transform = SpinHarmonicTransform(
+            bandlimit, sampling=self.sky.sampling_name, real=True, threads=self.transform.threads
+        )
+        mean = transform.analysis(values)[0].real / np.sqrt(4 * np.pi)
+        return float(np.clip(mean, 0.0, 1.0))
 
     def apply(self, coefficients: WaveletCoefficients) -> WaveletCoefficients:
         """Weigh the coefficients of the masked map."""

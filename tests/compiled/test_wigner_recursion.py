@@ -24,6 +24,11 @@ PAIRS = [(0, 0), (1, 0), (0, 2), (2, 2), (2, -2), (1, -3), (3, 1), (5, 4), (0, -
 COSINES = [Fraction(3, 5), Fraction(-4, 5), Fraction(15, 17), Fraction(0), Fraction(-40, 41)]
 
 
+def roots_and_inverses(bandlimit):
+    numbers = np.arange(2.0 * bandlimit + 2)
+    return np.sqrt(numbers), np.divide(1.0, numbers, out=np.zeros_like(numbers), where=numbers > 0)
+
+
 def central_binomials(bandlimit):
     """binom(2M, M) / 4^M, exact to one rounding."""
     return np.array([float(Fraction(math.comb(2 * M, M), 4**M)) for M in range(bandlimit + 1)])
@@ -32,16 +37,18 @@ def central_binomials(bandlimit):
 def run(bandlimit, m, n, cosine):
     """Return (d, exponent): d 2^exponent = d^l_mn for l = max(m, |n|) .. L - 1, and the first l."""
     sine, plus, minus = math.sqrt(1 - cosine**2), float(1 + cosine), float(1 - cosine)
-    root = np.sqrt(np.arange(2.0 * bandlimit + 2))
     a, b, scale = (np.empty(bandlimit + 1) for _ in range(3))
-    fill_recursion(m, n, bandlimit, root, a, b, scale)
+    fill_recursion(m, n, bandlimit, *roots_and_inverses(bandlimit), a, b, scale)
     ring = {key: np.empty(1) for key in ("s", "s_power", "o", "o_power", "before", "now", "exp")}
     fill_powers(np.array([sine]), abs(m - abs(n)), ring["s"], ring["s_power"])
     one = np.array([plus if n >= 0 else minus])
     fill_powers(one, min(m, abs(n)), ring["o"], ring["o_power"])
     first, other = max(m, abs(n)), n if m >= abs(n) else m
     norm, norm_power = start_norm(first, other, central_binomials(bandlimit))
-    fill_start(norm, norm_power, *ring.values())
+    powers = np.stack([ring[key] for key in ("s", "s_power", "o", "o_power")])
+    state = (ring["before"], ring["now"], ring["exp"], np.empty(1))
+    inside = fill_start(norm, norm_power, powers, 0, *state)
+    assert inside == (ring["exp"][0] == 0.0)
     # The closed form's sign: (-1)^(m-n) where m leads, else (-1)^(|n|-m) for negative n.
     is_odd = (m - n) % 2 if m >= abs(n) else (abs(n) - m) % 2 * (n < 0)
     values, exponents = [], []
@@ -102,8 +109,9 @@ def test_start_is_right_far_below_the_range_of_floats(el, n, theta):
     fill_powers(np.array([one]), abs(n), *outs[2:])
     index = np.arange(1, el + 1)
     central = np.concatenate([[1.0], np.cumprod((2 * index - 1) / (2 * index))])
-    before, now, scale = (np.empty(1) for _ in range(3))
-    fill_start(*start_norm(el, n, central), *outs, before, now, scale)
+    before, now, scale, power = (np.empty(1) for _ in range(4))
+    powers = np.stack(outs)
+    fill_start(*start_norm(el, n, central), powers, 0, before, now, scale, power)
     found = math.log2(now[0]) + 800 * scale[0]
     binomial = math.lgamma(2 * el + 1) - math.lgamma(el + n + 1) - math.lgamma(el - n + 1)
     half = theta / 2
@@ -161,9 +169,9 @@ def test_norm_of_the_start_is_a_binomial(M, K):
 
 def test_a_pole_stays_zero():
     """sin(0)^k = 0 is no small number: no exponent, and it counts as in range."""
-    before, now, scale = np.empty(2), np.empty(2), np.empty(2)
-    sines, zeros = np.array([0.0, 0.5]), np.zeros(2)
-    fill_start(1.0, 0.0, sines, zeros, np.ones(2), zeros, before, now, scale)
+    before, now, scale, power = (np.empty(2) for _ in range(4))
+    powers = np.stack([np.array([0.0, 0.5]), np.zeros(2), np.ones(2), np.zeros(2)])
+    assert fill_start(1.0, 0.0, powers, 0, before, now, scale, power) == 2
     assert now.tolist() == [0.0, 0.5]
     assert scale.tolist() == [0.0, 0.0]
     assert rescale(before, now, scale) == 2
@@ -183,10 +191,9 @@ def test_rescaling_brings_a_ring_back_one_step_at_a_time():
 def test_values_out_of_range_stay_negligible_between_two_looks():
     """PADDING steps multiply u by less than 2^90, |n| <= 8: from 2^-160 no sum could notice it."""
     bandlimit, worst = 3000, 0.0
-    root = np.sqrt(np.arange(2.0 * bandlimit + 2))
     a, b, scale = (np.empty(bandlimit + 1) for _ in range(3))
     for m, n in [(0, 0), (1, 0), (0, 1), (8, 8), (100, 2), (1000, -8), (2900, 0), (2900, 8)]:
-        fill_recursion(m, n, bandlimit, root, a, b, scale)
+        fill_recursion(m, n, bandlimit, *roots_and_inverses(bandlimit), a, b, scale)
         first = max(m, abs(n))
         growth = np.abs(a[first:bandlimit]) + np.abs(b[first:bandlimit]) + 1
         logarithms = np.log2(growth)
@@ -199,9 +206,8 @@ def test_values_out_of_range_stay_negligible_between_two_looks():
 def test_scales_of_neighbouring_degrees_are_those_of_the_recursion(m, n):
     """scale_{l+1} w_{l+1} = scale_{l-1} w_l, w_l = sqrt((l^2 - m^2)(l^2 - n^2)) / l."""
     bandlimit = 60
-    root = np.sqrt(np.arange(2.0 * bandlimit + 2))
     a, b, scale = (np.empty(bandlimit + 1) for _ in range(3))
-    fill_recursion(m, n, bandlimit, root, a, b, scale)
+    fill_recursion(m, n, bandlimit, *roots_and_inverses(bandlimit), a, b, scale)
     first = max(m, abs(n))
 
     def w(el):
