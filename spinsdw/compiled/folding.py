@@ -31,66 +31,81 @@ def _fill_phases(phi, phases):
 
 
 @kernel
-def _fill_ring_phases(phis, phases):
+def _fill_ring_phases(phis, row, phases):
+    """phases[m, r] = e^{i m phis[r]}; neighbouring rings of the belt share theirs."""
     for r in range(phis.size):
         if r > 1 and phis[r] == phis[r - 2]:
-            phases[r] = phases[r - 2]
+            for m in range(row.size):
+                phases[m, r] = phases[m, r - 2]
         else:
-            _fill_phases(phis[r], phases[r])
+            _fill_phases(phis[r], row)
+            for m in range(row.size):
+                phases[m, r] = row[m]
 
 
 @kernel
-def _add_mode(value, k, points, is_real, out):
-    """Add F e^{i k phi}, 0 <= k < points; of a real map also its conjugate, once."""
-    if not is_real:
-        out[k] += value
-    elif k in (0, points // 2):
-        out[k] += 2.0 * value.real
-    elif k < points // 2:
-        out[k] += value
+def _next_modes(sizes, modes):
+    """Count m modulo the points of each ring: a division for each would cost more than the sum."""
+    for r in range(sizes.size):
+        modes[r] += 1
+        if modes[r] == sizes[r]:
+            modes[r] = 0
+
+
+@kernel
+def _add_real_mode(value, k, points, out, start):
+    """Add F e^{i k phi} and its conjugate to a half series, 0 <= k < points."""
+    if k == 0 or 2 * k == points:
+        out[start + k] += 2.0 * value.real
+    elif 2 * k < points:
+        out[start + k] += value
     else:
-        out[points - k] += value.conjugate()
+        out[start + points - k] += value.conjugate()
 
 
 @kernel
 def fill_folded(L, columns, first_ring, sizes, phis, starts, is_real, folded):
     """Fold the columns of sizes.size rings from first_ring on; ring r begins at starts[r]."""
     n_m, n_rings = columns.shape[0], sizes.size
-    phases = np.empty((n_rings, L), dtype=np.complex128)
-    _fill_ring_phases(phis, phases)
+    phases = np.empty((L, n_rings), dtype=np.complex128)
+    _fill_ring_phases(phis, np.empty(L, dtype=np.complex128), phases)
+    modes = np.zeros(n_rings, dtype=np.int64)
     folded[:] = 0.0
-    for m in range(L):
+    for r in range(n_rings):
+        value = columns[0, first_ring + r]
+        folded[starts[r]] += value.real if is_real else value
+    for m in range(1, L):
+        _next_modes(sizes, modes)
         for r in range(n_rings):
-            points = sizes[r]
-            out = folded[starts[r] :]
-            value = columns[m, first_ring + r]
-            if m == 0:
-                out[0] += value.real if is_real else value
+            k, phase = modes[r], phases[m, r]
+            value = phase * columns[m, first_ring + r]
+            if is_real:
+                _add_real_mode(value, k, sizes[r], folded, starts[r])
             else:
-                _add_mode(phases[r, m] * value, m % points, points, is_real, out)
-                if not is_real:
-                    value = phases[r, m].conjugate() * columns[n_m - m, first_ring + r]
-                    _add_mode(value, (points - m % points) % points, points, is_real, out)
-
-
-@kernel
-def _mode(k, points, is_real, values):
-    if is_real and k > points // 2:
-        return values[points - k].conjugate()
-    return values[k]
+                opposite = sizes[r] - k if k > 0 else 0
+                folded[starts[r] + k] += value
+                value = phase.conjugate() * columns[n_m - m, first_ring + r]
+                folded[starts[r] + opposite] += value
 
 
 @kernel
 def fill_unfolded(L, folded, first_ring, sizes, phis, starts, is_real, columns):
     """Adjoint of `fill_folded`, the conjugate half of a real map left out."""
     n_m, n_rings = columns.shape[0], sizes.size
-    phases = np.empty((n_rings, L), dtype=np.complex128)
-    _fill_ring_phases(phis, phases)
-    for m in range(L):
+    phases = np.empty((L, n_rings), dtype=np.complex128)
+    _fill_ring_phases(phis, np.empty(L, dtype=np.complex128), phases)
+    modes = np.zeros(n_rings, dtype=np.int64)
+    for r in range(n_rings):
+        columns[0, first_ring + r] = folded[starts[r]]
+    for m in range(1, L):
+        _next_modes(sizes, modes)
         for r in range(n_rings):
-            points, phase = sizes[r], phases[r, m]
-            values = folded[starts[r] :]
-            k = m % points
-            columns[m, first_ring + r] = phase.conjugate() * _mode(k, points, is_real, values)
-            if m > 0 and not is_real:
-                columns[n_m - m, first_ring + r] = phase * values[(points - k) % points]
+            k, phase = modes[r], phases[m, r]
+            opposite = sizes[r] - k if k > 0 else 0
+            if is_real and 2 * k > sizes[r]:
+                value = folded[starts[r] + opposite].conjugate()
+            else:
+                value = folded[starts[r] + k]
+            columns[m, first_ring + r] = phase.conjugate() * value
+            if not is_real:
+                columns[n_m - m, first_ring + r] = phase * folded[starts[r] + opposite]
