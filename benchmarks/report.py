@@ -45,7 +45,12 @@ def duration(seconds: float) -> str:
 def times(ratio: float) -> str:
     """Write a ratio of times, in bold where the peer is faster."""
     text = f"{ratio:.1f}" if ratio >= 9.95 else f"{ratio:.2f}"
-    return f"**{text}**" if ratio < 1 else text
+    return f"**{text}**" if is_loss(ratio) else text
+
+
+def is_loss(ratio: float) -> bool:
+    """Tell whether the peer is faster, to the digits that are printed."""
+    return round(ratio, 2) < 1
 
 
 def size_text(count: float) -> str:
@@ -127,7 +132,7 @@ def _losses(jobs: dict[str, Rows]) -> list[str]:
     for job in (*COMPARED, "batch"):
         for row in jobs.get(job, []):
             slower = 1 / _ratio(row)
-            if slower > 1:
+            if is_loss(_ratio(row)):
                 sizes = ", ".join(
                     f"{key} = {row[key]}" for key in ("nside", "L", "N") if key in row
                 )
