@@ -2,8 +2,9 @@
 
 Every job's rows are printed as they come and written to a JSON file after each job, with the
 machine, the versions and the date; ``python benchmarks/report.py`` makes the documentation's tables
-and figures from it. ``--full`` takes about an hour on two cores, ``--quick`` a minute or two.
-Nothing else should run meanwhile.
+and figures from that of the full run. ``--full`` takes about an hour on two cores and 8 GB of
+memory, ``--quick`` a minute or two. Nothing else should run meanwhile. Jobs that are named are
+measured alone and join the others in the file.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ Row = dict[str, Any]
 Job = Callable[[Plan], Iterator[Row]]
 
 RESULTS = Path(__file__).with_name("results.json")
+OTHER_RESULTS = RESULTS.parents[1] / "build" / "benchmarks.json"
 PACKAGES = ("spinsdw", "numba", "llvmlite", "numpy", "ducc0", "pys2let")
 
 JOBS: dict[str, Job] = {
@@ -140,8 +142,11 @@ def _arguments() -> argparse.Namespace:
         size.add_argument(f"--{name}", dest="plan", action="store_const", const=name)
     parser.set_defaults(plan="quick")
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of threads, such as 1 2")
-    parser.add_argument("--output", type=Path, default=RESULTS)
+    parser.add_argument("--output", type=Path, help=f"{RESULTS.name} for --full, or in build/")
     choices = parser.parse_args()
+    if choices.output is None:
+        # The results that are kept are those of the full run alone.
+        choices.output = RESULTS if choices.plan == "full" else OTHER_RESULTS
     unknown = set(choices.jobs) - set(JOBS)
     if unknown:
         parser.error(f"jobs {sorted(unknown)} are not among {', '.join(JOBS)}")
@@ -154,6 +159,7 @@ def main() -> None:
     if choices.threads:
         plan = plan.with_threads(tuple(choices.threads))
     jobs = _earlier_jobs(choices.output, machine) if choices.jobs else {}
+    choices.output.parent.mkdir(parents=True, exist_ok=True)
     for name in choices.jobs or JOBS:
         jobs[name] = {"plan": choices.plan, **measure(name, plan)}
         text = json.dumps({"machine": machine, "jobs": jobs}, indent=1)
