@@ -42,6 +42,8 @@ def fill_negative_orders(flm: Array) -> None:
     for m in range(1, bandlimit):
         base = el[m:] ** 2 + el[m:]
         flm[..., base - m] = (-1.0) ** m * flm[..., base + m].conj()
+    # Rounding leaves some in place of zero.
+    flm.imag[..., el**2 + el] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,8 @@ class GridSums:
         Whether the maps are real.
     threads : int
         Threads to share the work.
+    workspace : ndarray, shape (at least `workspace_size`,), complex128, optional
+        Room for the Fourier columns: fresh memory costs as much as the transform that fills it.
     """
 
     sampling: Sampling
@@ -67,6 +71,7 @@ class GridSums:
     mixing: Array
     real: bool
     threads: int
+    workspace: Array | None = None
 
     @property
     def _n_m(self) -> int:
@@ -76,11 +81,28 @@ class GridSums:
     def _order_sums(self, weights: Array, lowest: int) -> OrderSums:
         return OrderSums(self.orders, weights, lowest, 1 if self.real else 2, self.threads)
 
+    @property
+    def workspace_size(self) -> int:
+        """Complex numbers that hold the Fourier columns of all outputs."""
+        return max(self.mixing.shape) * self._n_m * self.sampling.n_rings
+
+    @property
+    def maps_dtype(self) -> type[np.generic]:
+        """Type of the output maps."""
+        return np.float64 if self.real else np.complex128
+
+    @property
+    def maps_shape(self) -> tuple[int, int, int]:
+        """Shape of the output maps."""
+        return (self.mixing.shape[0], *self.sampling.shape)
+
     def _columns(self) -> Array:
-        """Return room for the Fourier columns of all outputs."""
-        rows = max(self.mixing.shape)
-        shape = (rows, self._n_m, self.sampling.n_rings)
-        columns = np.empty(shape, dtype=np.complex128)
+        """Return room for the Fourier columns of all outputs, in the workspace if there is one."""
+        shape = (max(self.mixing.shape), self._n_m, self.sampling.n_rings)
+        room = self.workspace
+        if room is None:
+            room = np.empty(self.workspace_size, dtype=np.complex128)
+        columns = room[: self.workspace_size].reshape(shape)
         # MWSS has one more Fourier mode, |m| = L, than a band-limited signal.
         if self.sampling.n_phi == 2 * self.sampling.bandlimit:
             columns[:, self.sampling.bandlimit] = 0.0
@@ -103,12 +125,19 @@ class GridSums:
         self._share(lambda a, b: mix_columns(mixing, a, b, columns), self._n_m, 32)
 
     def to_grid(
-        self, flm: Array, weights: Array, *, lowest: int = 0, quadrature: bool = False
+        self,
+        flm: Array,
+        weights: Array,
+        *,
+        lowest: int = 0,
+        quadrature: bool = False,
+        out: Array | None = None,
     ) -> Array:
         """Return maps, shape (outputs, rings, phi), from flm (1 or orders, L*L).
 
         ``weights``: (orders, L) complex. With ``quadrature`` the grid's quadrature is applied to
-        the columns of every order first: that is the adjoint of an analysis.
+        the columns of every order first: that is the adjoint of an analysis. The maps go to
+        ``out`` where it is given.
         """
         columns = self._columns()
         engine, sums = _engine(self.sampling), self._order_sums(weights, lowest)
@@ -120,9 +149,7 @@ class GridSums:
         else:
             engine.fill_columns(flm, sums, self.mixing, columns)
         outputs = self.mixing.shape[0]
-        maps = np.empty(
-            (outputs, *self.sampling.shape), dtype=np.float64 if self.real else np.complex128
-        )
+        maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
         self._share_rings(lambda a, b: fill_maps(columns[:outputs, :, a:b], maps[:, a:b]), outputs)
         return maps
 
