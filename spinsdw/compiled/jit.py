@@ -2,8 +2,9 @@
 
 Why a cache of our own: numba's in-tree cache knows one source file, while a function here inlines
 helpers from its neighbours; a half-written or unreadable cache file makes numba raise at the first
-call; and a read-only home makes it raise at import. `PackageCache` stamps every entry with the
-content of the whole folder and treats anything it cannot read or write as "not cached".
+call, a damaged one may end the process; and a read-only home makes it raise at import.
+`PackageCache` has a folder for each content of this one, seals every file with a digest and treats
+anything it cannot read or write as "not cached".
 """
 
 from __future__ import annotations
@@ -29,13 +30,15 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # "nnan" and "ninf" are left out: with them a NaN in a map could turn into a plausible number.
 _FAST = {"contract", "nsz", "arcp"}
 _FOLDER = Path(__file__).resolve().parent
+_SEAL_BYTES = hashlib.sha256().digest_size
 
 
 def cache_directory() -> Path | None:
     """Return the folder for machine code, or None where caching is off or nothing is writable.
 
     ``SPINSDW_CACHE`` names a folder, or switches caching off with ``0``; otherwise it is
-    ``spinsdw`` below ``XDG_CACHE_HOME`` or ``~/.cache``.
+    ``spinsdw`` below ``XDG_CACHE_HOME`` or ``~/.cache``. In it every version of numba, Python, the
+    package and every setting of the vector width has a folder of its own.
     """
     setting = os.environ.get("SPINSDW_CACHE", "")
     if setting == "0":
@@ -44,8 +47,17 @@ def cache_directory() -> Path | None:
         base = Path(setting)
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "spinsdw"
-    folder = base / f"numba-{numba.__version__}-python-{sys.version_info[0]}{sys.version_info[1]}"
+    python = f"{sys.version_info[0]}{sys.version_info[1]}"
+    width = _vector_setting() or "host"
+    versions = f"numba-{numba.__version__}-python-{python}-width-{width}-{_source_stamp()[:16]}"
+    folder = base / versions
     return folder if _is_ours(folder) else None
+
+
+def _vector_setting() -> str:
+    """Return the vector width asked for, "" where the machine decides."""
+    setting = os.environ.get("SPINSDW_VECTOR_WIDTH", "")
+    return setting if setting in {"2", "4", "8"} else ""
 
 
 def _is_ours(folder: Path) -> bool:
@@ -67,7 +79,7 @@ def _source_stamp() -> str:
     for path in sorted(_FOLDER.glob("*.py")):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     # The vector width is chosen at run time and compiled in.
-    digest.update(os.environ.get("SPINSDW_VECTOR_WIDTH", "").encode())
+    digest.update(_vector_setting().encode())
     return digest.hexdigest()
 
 
@@ -100,6 +112,42 @@ class _Implementation(caching.CompileResultCacheImpl):
         self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
 
 
+class _SealedFile(caching.IndexDataCacheFile):
+    """Numba's index and data files, each after the digest of its content.
+
+    A changed byte of machine code crashes the process, and one of a pickle may do anything: so
+    nothing is unpickled before its digest is found right. This is against accidents; against
+    others there is `_is_ours`.
+    """
+
+    def _write(self, path: str, content: object) -> None:
+        data = self._dump(content)
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(data).digest() + data)
+
+    def _read(self, path: str) -> Any:
+        """Return what was written, None where it is not there or not whole."""
+        try:
+            sealed = Path(path).read_bytes()
+        except FileNotFoundError:
+            return None
+        seal, data = sealed[:_SEAL_BYTES], sealed[_SEAL_BYTES:]
+        return pickle.loads(data) if hashlib.sha256(data).digest() == seal else None
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._write(self._index_path, (self._source_stamp, overloads))
+
+    def _load_index(self) -> dict[Any, str]:
+        stamp, overloads = self._read(self._index_path) or (None, {})
+        return overloads if stamp == self._source_stamp else {}
+
+    def _save_data(self, name: str, data: object) -> None:
+        self._write(self._data_path(name), data)
+
+    def _load_data(self, name: str) -> Any:
+        return self._read(self._data_path(name))
+
+
 class PackageCache(caching.FunctionCache):
     """Numba's function cache that never fails: what cannot be read is compiled again."""
 
@@ -108,7 +156,7 @@ class PackageCache(caching.FunctionCache):
         self._py_func = py_func
         self._impl = _Implementation(py_func, folder)
         self._cache_path = str(folder)
-        self._cache_file = caching.IndexDataCacheFile(
+        self._cache_file = _SealedFile(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
             source_stamp=self._impl.locator.get_source_stamp(),
@@ -118,8 +166,10 @@ class PackageCache(caching.FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
-        except (OSError, EOFError, pickle.UnpicklingError, ValueError, ImportError, AttributeError):
-            # Empty, truncated or foreign file: numba will compile and write a new one.
+        except Exception:
+            # Whole, but of no use here: unpickling and linking raise whatever the parts they call
+            # raise. Nothing is lost: numba compiles as if there were no file, and raises again
+            # what is not the file's fault.
             self._forget()
             return None
 

@@ -79,6 +79,8 @@ def test_kernels_of_one_name_do_not_share_machine_code():
         (".nbc", b"\0"),
         (".nbc", b"no pickle at all"),
         (".nbc", pickle.dumps(None)),
+        (".nbc", pickle.dumps(3)),
+        (".nbc", pickle.dumps((1, 2, 3))),
     ],
 )
 def test_a_file_that_is_no_cache_is_compiled_anew(cache, suffix, content):
@@ -100,6 +102,32 @@ def test_a_file_cut_short_is_compiled_anew(cache, suffix, share):
             content = path.read_bytes()
             path.write_bytes(content[: int(share * len(content))])
     use()
+    assert use() == 1
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("share", [0.0, 0.003, 0.3, 0.7, 0.999])
+def test_a_changed_bit_is_noticed(cache, suffix, share):
+    """Machine code with a bit changed crashed the process."""
+    use()
+    for path in files(cache):
+        if path.suffix == suffix:
+            content = bytearray(path.read_bytes())
+            content[int(share * len(content))] ^= 16
+            path.write_bytes(content)
+    assert use() == 0
+    assert use() == 1
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.parametrize("content", [3, None, (1, 2), "text"])
+def test_a_whole_file_of_the_wrong_kind_is_compiled_anew(content):
+    """Its digest is right: it was unpickled and rebuilding raised a TypeError."""
+    use()
+    entry = jit.kernel(add_squares)._cache._cache_file
+    (name,) = entry._load_index().values()
+    entry._save_data(name, content)
+    assert use() == 0
     assert use() == 1
 
 
@@ -142,6 +170,27 @@ def test_width_of_vectors_is_part_of_the_stamp(monkeypatch):
         monkeypatch.setenv("SPINSDW_VECTOR_WIDTH", width)
         stamps.add(jit._source_stamp.__wrapped__())
     assert len(stamps) == 3
+
+
+def test_widths_of_vectors_do_not_share_a_folder(cache, monkeypatch):
+    """They wrote the same files, each in place of the other's."""
+    folders = set()
+    for width in ("2", "4", "8", ""):
+        monkeypatch.setenv("SPINSDW_VECTOR_WIDTH", width)
+        folders.add(jit.cache_directory())
+    assert len(folders) == 4
+    monkeypatch.setenv("SPINSDW_VECTOR_WIDTH", "../elsewhere")
+    assert jit.cache_directory() in folders
+    assert all(folder.parent == cache for folder in folders)
+
+
+def test_versions_of_the_sources_do_not_share_a_folder(cache, monkeypatch):
+    use()
+    monkeypatch.setattr(jit, "_source_stamp", lambda: "another")
+    use()
+    monkeypatch.undo()
+    monkeypatch.setenv("SPINSDW_CACHE", str(cache))
+    assert use() == 1
 
 
 def test_zero_switches_the_cache_off(tmp_path, monkeypatch):
