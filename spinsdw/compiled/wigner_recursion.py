@@ -34,7 +34,9 @@ __all__ = [
 
 # Degrees advanced between two looks at the exponents; arrays over degree are padded by as much.
 PADDING = 16
-# A ring whose values are below 2**-160 is "out of range": 16 steps grow it by less than 2**90.
+# A ring whose values are below 2**-160 is "out of range". 16 steps grow it by less than 2**90 for
+# |n| <= 8; the most measured is 2**143, at |n| about 1500. No loss was seen up to spin 1300 at
+# L = 1400.
 _STEP = 800
 _FLOOR = -160
 _SHRINK = 2.0**-_STEP
@@ -81,6 +83,9 @@ def fill_powers(base, exponent, mantissa, power):
                 if mantissa[r] < _UNRENORM:
                     mantissa[r] *= _RENORM
                     power[r] -= 256.0
+                elif mantissa[r] > _RENORM:
+                    mantissa[r] *= _UNRENORM
+                    power[r] += 256.0
             square *= square
             square_power *= 2.0
             if square < _UNRENORM:
@@ -94,7 +99,7 @@ def fill_powers(base, exponent, mantissa, power):
 
 @kernel
 def multiply_powers(base, mantissa, power):
-    """Raise the exponent of `fill_powers` by one."""
+    """Raise the exponent of `fill_powers` by one, for a base in [0, 1]."""
     for r in range(base.size):
         value = mantissa[r] * base[r]
         small = value < _UNRENORM
