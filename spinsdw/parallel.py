@@ -7,6 +7,7 @@ threads, so results do not depend on it, bit for bit.
 from __future__ import annotations
 
 import functools
+import operator
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -28,10 +29,14 @@ def resolve_threads(threads: int | None) -> int:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
-    if isinstance(threads, bool) or int(threads) != threads or threads < 1:
+    try:
+        count = 0 if isinstance(threads, bool) else operator.index(threads)
+    except TypeError:
+        count = 0
+    if count < 1:
         msg = f"threads={threads!r} must be a positive integer, or None for all cores."
         raise ParameterError(msg)
-    return int(threads)
+    return count
 
 
 @functools.cache

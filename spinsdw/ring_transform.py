@@ -16,7 +16,7 @@ from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads, run_tasks
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.healpix_rings import HealpixRings
-from spinsdw.signals import check_map, check_spin
+from spinsdw.signals import check_flag, check_map, check_spin, writable
 
 __all__ = ["HealpixTransform"]
 
@@ -131,11 +131,12 @@ class HealpixTransform:
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         spin = check_spin(spin, bandlimit)
+        real = check_flag(real, "real")
         if real and spin != 0:
             msg = f"real=True needs spin 0, not spin={spin}; a signal with spin is complex."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (HealpixRings(nside).nside, bandlimit, spin, bool(real), threads)
+        values = (HealpixRings(nside).nside, bandlimit, spin, real, threads)
         for field, value in zip(fields(self), values, strict=True):
             object.__setattr__(self, field.name, value)
 
@@ -212,11 +213,14 @@ class HealpixTransform:
         DataError
             If a coefficient is not a finite number.
         """
-        flm = check_flm(flm, self.bandlimit)
+        flm = writable(check_flm(flm, self.bandlimit))
         if flm.ndim == 1:
             return self._to_map(flm)
-        maps = [self._to_map(one) for one in flm.reshape(-1, flm.shape[-1])]
-        return np.stack(maps).reshape(*flm.shape[:-1], self.rings.n_pixels)
+        batch = flm.reshape(-1, flm.shape[-1])
+        maps = np.empty((len(batch), *self.shape), np.float64 if self.real else np.complex128)
+        for one, out in zip(batch, maps, strict=True):
+            out[...] = self._to_map(one)
+        return maps.reshape(*flm.shape[:-1], *self.shape)
 
     def adjoint_synthesis(self, maps: Array) -> Array:
         """Apply the adjoint of `synthesis`: sums over pixels, without quadrature weights.

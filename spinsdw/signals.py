@@ -1,4 +1,4 @@
-"""Checks of what users hand over: spins and maps."""
+"""Checks of what users hand over: spins, flags and maps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
 
-__all__ = ["check_finite", "check_map", "check_spin"]
+__all__ = ["check_finite", "check_flag", "check_map", "check_spin", "writable"]
 
 Array = np.ndarray[Any, Any]
 
@@ -27,16 +27,37 @@ def check_spin(spin: object, bandlimit: int) -> int:
     return int(spin)
 
 
+def check_flag(value: object, name: str) -> bool:
+    """Return a flag as a bool; a text such as "no" would count as true."""
+    if not isinstance(value, bool | np.bool_):
+        msg = f"{name}={value!r} must be True or False."
+        raise ParameterError(msg)
+    return bool(value)
+
+
 def check_finite(values: Array, name: str) -> None:
     """Raise `DataError` if an array holds NaN or infinity."""
     bad = values.size - int(np.count_nonzero(np.isfinite(values)))
     if bad:
-        msg = f"{name} has {bad} values that are not finite; mask or replace them first."
+        found = "1 value that is" if bad == 1 else f"{bad} values that are"
+        remedy = f"mask or replace {'it' if bad == 1 else 'them'} first"
+        msg = f"{name} has {found} not finite; {remedy}."
         raise DataError(msg)
+
+
+def writable(values: Array) -> Array:
+    """Return an array for compiled code: itself, or a copy of a read-only or unaligned one.
+
+    A loop is compiled for one kind of array, and to the compiler those are others.
+    """
+    return np.require(values, requirements=["C", "A", "W"])
 
 
 def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "map") -> Array:
     """Return maps as a native C-ordered float64 (``real``) or complex128 array, checked."""
+    if np.ma.is_masked(maps):
+        msg = f"{name} has masked entries, and every value must be known; fill them first."
+        raise DataError(msg)
     values = np.asarray(maps)
     if values.dtype.kind not in "biufc":
         msg = f"{name} has dtype {values.dtype}; it must hold real or complex numbers."

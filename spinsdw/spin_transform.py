@@ -14,7 +14,7 @@ from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
-from spinsdw.signals import check_map, check_spin
+from spinsdw.signals import check_flag, check_map, check_spin, writable
 
 __all__ = ["SpinHarmonicTransform"]
 
@@ -74,11 +74,12 @@ class SpinHarmonicTransform:
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         spin = check_spin(spin, bandlimit)
+        real = check_flag(real, "real")
         if real and spin != 0:
             msg = f"real=True needs spin 0, not spin={spin}; a signal with spin is complex."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (bandlimit, spin, resolve_sampling(sampling, bandlimit), bool(real), threads)
+        values = (bandlimit, spin, resolve_sampling(sampling, bandlimit), real, threads)
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
@@ -104,7 +105,7 @@ class SpinHarmonicTransform:
         return GridSums(self._grid, (-self.spin,), one, self.real, resolve_threads(self.threads))
 
     def _to_maps(self, flm: Array, *, quadrature: bool) -> Array:
-        flm = check_flm(flm, self.bandlimit)
+        flm = writable(check_flm(flm, self.bandlimit))
         call: Callable[[Array], Array] = lambda one: self._sums.to_grid(  # noqa: E731
             one[None], self._weights, quadrature=quadrature
         )[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums
-from spinsdw.harmonics import check_bandlimit, check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
-from spinsdw.signals import check_map
+from spinsdw.signals import check_flag, check_map, writable
 
 __all__ = ["WignerTransform"]
 
@@ -22,9 +22,12 @@ Array = np.ndarray[Any, Any]
 
 
 def _check_orders(orders: Sequence[int], bandlimit: int) -> tuple[int, ...]:
-    values = tuple(int(n) for n in orders)
+    if not isinstance(orders, Iterable):
+        msg = f"orders={orders!r} must be a sequence of integers; pass a tuple."
+        raise ParameterError(msg)
+    values = tuple(check_integer(n, "orders", remedy="each is one") for n in orders)
     if not values or sorted(set(values)) != list(values):
-        msg = f"orders={tuple(orders)!r} must be distinct integers in increasing order."
+        msg = f"orders={values} must be distinct integers in increasing order; sort them."
         raise ParameterError(msg)
     largest = max(abs(n) for n in values)
     if largest >= bandlimit:
@@ -88,11 +91,12 @@ class WignerTransform:
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         checked = _check_orders(orders, bandlimit)
+        real = check_flag(real, "real")
         if real and tuple(-n for n in reversed(checked)) != checked:
             msg = f"real=True needs orders symmetric about 0, not {checked}; add the missing signs."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (bandlimit, checked, resolve_sampling(sampling, bandlimit), bool(real), threads)
+        values = (bandlimit, checked, resolve_sampling(sampling, bandlimit), real, threads)
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
@@ -132,7 +136,7 @@ class WignerTransform:
         return self._weights(np.full(self.bandlimit, 2 * np.pi / self.gammas.size))
 
     def _to_functions(self, coefficients: Array, weights: Array, *, quadrature: bool) -> Array:
-        values = check_flm(coefficients, self.bandlimit, "coefficients")
+        values = writable(check_flm(coefficients, self.bandlimit, "coefficients"))
         expected = (len(self.orders), self.bandlimit**2)
         if values.shape[-2:] != expected:
             msg = (
@@ -141,8 +145,11 @@ class WignerTransform:
             )
             raise ShapeError(msg)
         batch = values.reshape(-1, *expected)
-        maps = [self._sums.to_grid(one, weights, quadrature=quadrature) for one in batch]
-        return np.stack(maps).reshape(*values.shape[:-2], *self.shape)
+        dtype = np.float64 if self.real else np.complex128
+        maps = np.empty((batch.shape[0], *self.shape), dtype=dtype)
+        for one, out in zip(batch, maps, strict=True):
+            out[...] = self._sums.to_grid(one, weights, quadrature=quadrature)
+        return maps.reshape(*values.shape[:-2], *self.shape)
 
     def _to_coefficients(self, functions: Array, weights: Array, *, quadrature: bool) -> Array:
         values = check_map(functions, self.shape, real=self.real, name="function")
@@ -163,6 +170,11 @@ class WignerTransform:
         for m in range(1, self.bandlimit):
             base = el[m:] ** 2 + el[m:]
             found[..., base - m] = (-1.0) ** m * signs * opposite[..., base + m].conj()
+        # Of order m = 0, those of n < 0 follow from those of n > 0, and n = 0 is its own opposite.
+        zero, middle = el**2 + el, len(self.orders) // 2
+        found[:, :middle, zero] = (signs * opposite[..., zero].conj())[:, :middle]
+        if 0 in self.orders:
+            found.imag[:, middle, zero] = 0.0
 
     def synthesis(self, coefficients: Array) -> Array:
         """Compute functions from Wigner coefficients.

@@ -102,7 +102,7 @@ def test_the_imaginary_part_of_order_zero_is_no_part_of_a_real_field(real):
 
 
 @pytest.mark.parametrize("real", [False, True])
-@pytest.mark.parametrize("batch", [(3,), (2, 2), (1,)])
+@pytest.mark.parametrize("batch", [(3,), (2, 2), (1,), (0,), (2, 0)])
 def test_leading_axes_are_a_batch(batch, real):
     spin = 0 if real else 2
     transform = HealpixTransform(2, 5, spin, real=real)
@@ -159,9 +159,9 @@ def test_objects_describe_themselves_and_are_frozen():
         transform.nside = 2
 
 
-@pytest.mark.parametrize("nside", [0, -1, 2.5, True])
+@pytest.mark.parametrize("nside", [0, -1, 2.5, True, None, "a", [1], np.nan, np.inf])
 def test_nside_is_a_positive_integer(nside):
-    with pytest.raises(ParameterError, match=r"nside=.* must be a positive integer"):
+    with pytest.raises(ParameterError, match=r"nside=.* must be an integer of at least 1"):
         HealpixTransform(nside, 4)
 
 
@@ -177,7 +177,7 @@ def test_spin_is_an_integer_below_the_bandlimit(spin):
         HealpixTransform(2, 4, spin)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "a", "2", [1], np.nan, np.inf])
 def test_threads_are_a_positive_integer(threads):
     with pytest.raises(ParameterError, match=r"threads=.* must be a positive integer, or None"):
         HealpixTransform(2, 4, threads=threads)
@@ -186,6 +186,13 @@ def test_threads_are_a_positive_integer(threads):
 def test_signals_with_spin_are_not_real():
     with pytest.raises(ParameterError, match="real=True needs spin 0, not spin=2"):
         HealpixTransform(2, 4, 2, real=True)
+
+
+@pytest.mark.parametrize("real", ["no", 1, 0, None])
+def test_real_is_true_or_false(real):
+    """The text "no" counted as true."""
+    with pytest.raises(ParameterError, match=r"real=.* must be True or False"):
+        HealpixTransform(2, 4, real=real)
 
 
 @pytest.mark.parametrize(

@@ -184,7 +184,7 @@ def test_healpix_pixels_have_equal_areas(nside):
     np.testing.assert_allclose(z, 4 / 3 - 2 * belt / (3 * nside), rtol=0, atol=4e-16)
 
 
-@pytest.mark.parametrize("nside", [0, -2, 2.5, True])
+@pytest.mark.parametrize("nside", [0, -2, 2.5, True, None, "a", [1], np.nan, np.inf])
 def test_nside_is_a_positive_integer(nside):
-    with pytest.raises(ParameterError, match=r"nside=.* must be a positive integer"):
+    with pytest.raises(ParameterError, match=r"nside=.* must be an integer of at least 1"):
         HealpixRings(nside)

@@ -280,6 +280,15 @@ def test_one_transform_serves_many_threads():
     assert np.array_equal(alone, together)
 
 
+@pytest.mark.parametrize("name", ["analysis", "adjoint_synthesis"])
+def test_real_maps_have_exactly_the_coefficients_of_a_real_field(name):
+    """f_{l,-m} = (-1)^m conj(f_lm), m = 0 included: there rounding left an imaginary part."""
+    transform = SpinHarmonicTransform(9, real=True)
+    maps = transform.synthesis(random_real_flm(9, batch=(2,)))
+    flm = getattr(transform, name)(maps)
+    assert np.array_equal(flm, conjugate_field(flm))
+
+
 def test_inputs_are_left_alone_and_results_are_fresh():
     transform = SpinHarmonicTransform(9, 2)
     flm = random_flm(9)
@@ -439,7 +448,7 @@ def test_spin_is_an_integer(spin):
         SpinHarmonicTransform(4, spin)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "a", "2", [1], np.nan, np.inf])
 def test_threads_are_a_positive_integer(threads):
     with pytest.raises(ParameterError, match=r"threads=.* must be a positive integer, or None"):
         SpinHarmonicTransform(4, threads=threads)
@@ -448,6 +457,13 @@ def test_threads_are_a_positive_integer(threads):
 def test_signals_with_spin_are_not_real():
     with pytest.raises(ParameterError, match="real=True needs spin 0, not spin=2"):
         SpinHarmonicTransform(4, 2, real=True)
+
+
+@pytest.mark.parametrize("real", ["no", 1, 0, None])
+def test_real_is_true_or_false(real):
+    """The text "no" counted as true."""
+    with pytest.raises(ParameterError, match=r"real=.* must be True or False"):
+        SpinHarmonicTransform(4, real=real)
 
 
 @pytest.mark.parametrize("sampling", ["healpix", 3, MW(5)])
@@ -484,7 +500,16 @@ def test_coefficients_that_cannot_be_used_are_refused(name, flm, error, message)
         (np.full((4, 7), "a"), DataError, "must hold real or complex numbers"),
         (np.full((4, 7), None), DataError, "dtype object"),
         (np.full((4, 7), np.nan), DataError, "28 values that are not finite"),
-        (np.full((4, 7), -np.inf), DataError, "28 values that are not finite"),
+        (
+            np.full((4, 7), -np.inf),
+            DataError,
+            "28 values that are not finite; mask or replace them",
+        ),
+        (
+            np.where(np.arange(7) + np.zeros((4, 1)) < 6, 0, [[0], [0], [0], [np.nan]]),
+            DataError,
+            "map has 1 value that is not finite; mask or replace it first",
+        ),
     ],
 )
 def test_maps_that_cannot_be_used_are_refused(name, values, error, message):
@@ -497,3 +522,17 @@ def test_complex_maps_are_not_real(name):
     transform = SpinHarmonicTransform(4, real=True)
     with pytest.raises(DataError, match="complex but real=True was asked for"):
         getattr(transform, name)(np.zeros((4, 7), dtype=complex))
+
+
+@pytest.mark.parametrize("name", ["analysis", "adjoint_synthesis"])
+def test_masked_values_are_refused(name):
+    """What lies under a mask is no signal."""
+    values = np.ma.array(np.ones((4, 7)), mask=np.eye(4, 7))
+    with pytest.raises(DataError, match="has masked entries, and every value must be known"):
+        getattr(SpinHarmonicTransform(4), name)(values)
+
+
+def test_a_mask_without_entries_is_no_mask():
+    values = np.ones((4, 7))
+    transform = SpinHarmonicTransform(4)
+    assert np.array_equal(transform.analysis(np.ma.array(values)), transform.analysis(values))

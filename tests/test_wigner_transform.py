@@ -115,6 +115,16 @@ def test_real_functions_take_the_same_way(bandlimit, orders, sampling):
     assert_close(half.adjoint_analysis(coefficients), desired, ulps=tolerance(bandlimit))
 
 
+@pytest.mark.parametrize("sampling", GRIDS)
+@pytest.mark.parametrize(("bandlimit", "orders"), SYMMETRIC)
+def test_real_functions_have_exactly_symmetric_coefficients(bandlimit, orders, sampling):
+    """W_{l,-m,-n} = (-1)^(m+n) conj(W_lmn), bit for bit."""
+    transform = WignerTransform(bandlimit, orders, sampling=sampling, real=True)
+    noise = random_like(np.empty((2, *transform.shape)))
+    for found in (transform.analysis(noise), transform.adjoint_synthesis(noise)):
+        assert np.array_equal(found, make_real(found, orders))
+
+
 def check_adjoints(transform, coefficients):
     """<S w, g> = <w, S* g> and <A g, w> = <g, A* w>, for any function g."""
     values = transform.synthesis(coefficients)
@@ -216,7 +226,7 @@ def test_direct_sums_take_the_wigner_functions_of_spherical():
 
 
 @pytest.mark.parametrize("real", [False, True])
-@pytest.mark.parametrize("batch", [(3,), (2, 2), (1,)])
+@pytest.mark.parametrize("batch", [(3,), (2, 2), (1,), (0,), (2, 0)])
 def test_leading_axes_are_a_batch(batch, real):
     orders = (-2, 0, 2)
     transform = WignerTransform(6, orders, real=real)
@@ -278,6 +288,22 @@ def test_orders_are_distinct_and_increase(orders):
         WignerTransform(4, orders)
 
 
+@pytest.mark.parametrize("orders", [(0.5,), (1.0,), ("1",), (True,), (None,), "a", None, 3])
+def test_orders_are_integers(orders):
+    """0.5 became order 0 without a word."""
+    with pytest.raises(
+        ParameterError, match=r"orders=.* must be an? (integer|sequence of integers)"
+    ):
+        WignerTransform(4, orders)
+
+
+def test_orders_may_be_any_sequence_of_integers():
+    for orders in (range(-1, 2), [-1, 0, 1], np.arange(-1, 2), (n for n in (-1, 0, 1))):
+        found = WignerTransform(4, orders).orders
+        assert found == (-1, 0, 1)
+        assert all(type(n) is int for n in found)
+
+
 @pytest.mark.parametrize("orders", [(4,), (-4, 0), (0, 100)])
 def test_orders_stay_below_the_bandlimit(orders):
     with pytest.raises(ParameterError, match=r"must stay below bandlimit=4; drop the rest"):
@@ -290,7 +316,14 @@ def test_real_functions_have_orders_of_both_signs(orders):
         WignerTransform(4, orders, real=True)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+@pytest.mark.parametrize("real", ["no", 1, 0, None])
+def test_real_is_true_or_false(real):
+    """The text "no" counted as true."""
+    with pytest.raises(ParameterError, match=r"real=.* must be True or False"):
+        WignerTransform(4, (0,), real=real)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "a", "2", [1], np.nan, np.inf])
 def test_threads_are_a_positive_integer(threads):
     with pytest.raises(ParameterError, match=r"threads=.* must be a positive integer, or None"):
         WignerTransform(4, (0,), threads=threads)

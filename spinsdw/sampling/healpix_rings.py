@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from spinsdw.errors import ParameterError
+from spinsdw.harmonics import check_integer
 
 __all__ = ["HealpixRings"]
 
@@ -26,6 +26,11 @@ class HealpixRings:
     nside : int
         Any positive integer; only powers of two have a nested order.
 
+    Raises
+    ------
+    ParameterError
+        If ``nside`` is not an integer of at least 1.
+
     Examples
     --------
     >>> rings = HealpixRings(2)
@@ -38,10 +43,9 @@ class HealpixRings:
     nside: int
 
     def __post_init__(self) -> None:
-        if isinstance(self.nside, bool) or int(self.nside) != self.nside or self.nside < 1:
-            msg = f"nside={self.nside!r} must be a positive integer."
-            raise ParameterError(msg)
-        object.__setattr__(self, "nside", int(self.nside))
+        remedy = "a map has 12 nside**2 pixels"
+        nside = check_integer(self.nside, "nside", minimum=1, remedy=remedy)
+        object.__setattr__(self, "nside", nside)
 
     @property
     def n_pixels(self) -> int:
