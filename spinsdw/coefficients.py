@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
@@ -10,11 +11,28 @@ from typing import Any
 import numpy as np
 
 from spinsdw.directionality import Directionality
-from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.errors import DataError, ParameterError, ShapeError
 
 __all__ = ["WaveletCoefficients"]
 
 Array = np.ndarray[Any, Any]
+
+
+def _held(values: Array, name: str) -> Array:
+    """Return a view that cannot be written through."""
+    if np.ma.is_masked(values):
+        msg = f"{name} has masked entries, and every value must be known; fill them first."
+        raise DataError(msg)
+    view = np.asarray(values).view()
+    view.setflags(write=False)
+    return view
+
+
+def _is_number(value: object) -> bool:
+    """Tell whether a value is one number: Python's, or an array without axes."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and value.dtype.kind in "biufc"
+    return isinstance(value, numbers.Complex)
 
 
 class WaveletCoefficients:
@@ -28,10 +46,19 @@ class WaveletCoefficients:
         Coefficients of each scale j at orientations k pi / N.
     parameters : mapping
         What made them: bandlimit, spin, directions, dilation, lowest_scale, sampling,
-        multiresolution, real.
+        multiresolution, real; and tiling, a text, where that is of another kind.
+
+    Raises
+    ------
+    ShapeError
+        If a scale has not the directions of the parameters, or not the batch of the scaling part.
+    DataError
+        If an entry is masked.
 
     Notes
     -----
+    The arrays are held as they are, not copied, and can only be read: take ``a[j].copy()`` to
+    change one.
     Arithmetic acts on every number: ``a + b``, ``a - b``, ``2 * a``, and ``a * {j: factor}`` scale
     by scale, "scaling" being the key of the scaling part; `map` applies any function.
 
@@ -54,8 +81,8 @@ class WaveletCoefficients:
     def __init__(
         self, scaling: Array, wavelets: Mapping[int, Array], parameters: Mapping[str, Any]
     ) -> None:
-        self._scaling = np.asarray(scaling)
-        self._wavelets = {int(j): np.asarray(wavelets[j]) for j in sorted(wavelets)}
+        self._scaling = _held(scaling, "scaling part")
+        self._wavelets = {int(j): _held(wavelets[j], f"scale {j}") for j in sorted(wavelets)}
         self._parameters = MappingProxyType(dict(parameters))
         directions = self._parameters.get("directions")
         for j, values in self._wavelets.items():
@@ -67,9 +94,13 @@ class WaveletCoefficients:
                 )
                 raise ShapeError(msg)
 
+    # Built anew from its parts: the mapping of the parameters cannot be pickled itself.
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._scaling, self._wavelets, dict(self._parameters))
+
     @property
     def scaling(self) -> Array:
-        """Scaling coefficients, shape (..., rings, phi)."""
+        """Scaling coefficients, shape (..., rings, phi); read-only."""
         return self._scaling
 
     @property
@@ -97,6 +128,7 @@ class WaveletCoefficients:
         yield from self._wavelets.items()
 
     def __getitem__(self, scale: int) -> Array:
+        """Return the coefficients of a scale, shape (..., directions, rings, phi); read-only."""
         try:
             return self._wavelets[scale]
         except (KeyError, TypeError):
@@ -191,21 +223,37 @@ class WaveletCoefficients:
             return NotImplemented
         return self._combine(other, operator.sub)
 
+    def _weigh(self, factors: Mapping[Any, Any]) -> WaveletCoefficients:
+        unknown = set(factors) - {"scaling", *self.scales}
+        if unknown:
+            msg = f"factors for {sorted(map(str, unknown))} match no scale of {self.scales}."
+            raise ParameterError(msg)
+
+        def multiply(key: int | str, values: Array) -> Array:
+            factor = np.asarray(factors.get(key, 1.0))
+            sizes = zip(reversed(factor.shape), reversed(values.shape), strict=False)
+            if factor.ndim > values.ndim or any(one not in {1, other} for one, other in sizes):
+                name = "the scaling part" if key == "scaling" else f"scale {key}"
+                msg = (
+                    f"factor for {name} has shape {factor.shape}; it must be a number or broadcast "
+                    f"to {values.shape}."
+                )
+                raise ShapeError(msg)
+            return values * factor
+
+        return self._with(multiply)
+
     def __mul__(self, factor: complex | Mapping[Any, Any]) -> WaveletCoefficients:
         if isinstance(factor, Mapping):
-            unknown = set(factor) - {"scaling", *self.scales}
-            if unknown:
-                msg = f"factors for {sorted(map(str, unknown))} match no scale of {self.scales}."
-                raise ParameterError(msg)
-            return self._with(lambda key, values: values * np.asarray(factor.get(key, 1.0)))
-        if np.ndim(factor) != 0:
+            return self._weigh(factor)
+        if not _is_number(factor):
             return NotImplemented
         return self._with(lambda _, values: values * factor)
 
     __rmul__ = __mul__
 
     def __truediv__(self, divisor: complex) -> WaveletCoefficients:
-        if not np.isscalar(divisor):
+        if not _is_number(divisor):
             return NotImplemented
         return self._with(lambda _, values: values / divisor)
 
@@ -227,7 +275,17 @@ class WaveletCoefficients:
         -------
         dict of int to ndarray, shape (..., rings, phi)
             The coefficients of each scale at that orientation.
+
+        Raises
+        ------
+        ParameterError
+            If the angle is not one real number.
+        DataError
+            If it is not finite.
         """
+        if np.ndim(angle) != 0 or np.asarray(angle).dtype.kind not in "iuf":
+            msg = f"angle={angle!r} must be one real number, in radians; steer once for each."
+            raise ParameterError(msg)
         weights = Directionality(self._parameters["directions"]).steering_weights(angle)
         return {
             j: np.einsum("k,...ktp->...tp", weights, values) for j, values in self._wavelets.items()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection
-from dataclasses import dataclass, fields
+import hashlib
+from collections.abc import Collection, Hashable
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
-from spinsdw.signals import check_map
+from spinsdw.signals import check_flag, check_map, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
 from spinsdw.wavelets import Wavelets
@@ -24,6 +25,54 @@ from spinsdw.wavelets import Wavelets
 __all__ = ["SpinWaveletTransform"]
 
 Array = np.ndarray[Any, Any]
+
+# What coefficients may differ in from the transform that takes them: E and B are the parts of a
+# spin-2 analysis, and a scalar, maybe real, synthesis follows. Values are checked for being real.
+_FREE = {"spin", "real"}
+
+
+def _resolve_tiling(
+    tiling: Tiling | None, bandlimit: int, dilation: float | None, lowest_scale: int | None
+) -> Tiling:
+    if tiling is None:
+        return ScaleDiscretisedTiling(
+            bandlimit,
+            dilation=2.0 if dilation is None else dilation,
+            lowest_scale=0 if lowest_scale is None else lowest_scale,
+        )
+    if not isinstance(tiling, Tiling):
+        msg = f"tiling={tiling!r} must be a Tiling, such as ScaleDiscretisedTiling({bandlimit})."
+        raise ParameterError(msg)
+    for name, value in (("dilation", dilation), ("lowest_scale", lowest_scale)):
+        if value is not None:
+            msg = f"{name}={value!r} cannot be given with a tiling, which has its own; drop one."
+            raise ParameterError(msg)
+    if tiling.bandlimit != bandlimit:
+        msg = (
+            f"tiling has bandlimit {tiling.bandlimit} but the transform has {bandlimit}; "
+            "make the tiling with the transform's bandlimit."
+        )
+        raise ParameterError(msg)
+    return tiling
+
+
+def _digest(*arrays: Array) -> str:
+    content = b"".join(np.ascontiguousarray(values).tobytes() for values in arrays)
+    return f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
+
+
+def _tiling_text(tiling: Tiling) -> str:
+    """Name a tiling and its parameters in one line of text, an array by a digest of its values."""
+    name = type(tiling).__name__
+    if not is_dataclass(tiling):
+        kernels = (tiling.kernel(j) for j in tiling.scales)
+        return f"{name}({_digest(tiling.scaling_kernel, *kernels)})"
+    values = {item.name: getattr(tiling, item.name) for item in fields(tiling)}
+    texts = (
+        f"{key}={_digest(value) if isinstance(value, np.ndarray) else repr(value)}"
+        for key, value in values.items()
+    )
+    return f"{name}({', '.join(texts)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +92,9 @@ class SpinWaveletTransform:
     directions : int, default 1
         N, the azimuthal bandlimit: 1 is axisymmetric; N <= L.
     dilation : float, default 2.0
-        lambda > 1: scale j has degrees lambda^(j-1) < l < lambda^(j+1).
+        lambda > 1: scale j has degrees lambda^(j-1) < l < lambda^(j+1). Not with ``tiling``.
     lowest_scale : int, default 0
-        J0: larger structures belong to the scaling part.
+        J0: larger structures belong to the scaling part. Not with ``tiling``.
     sampling : str or Sampling, default "mw"
         Grid of maps; every scale uses the same kind at its own bandlimit.
     multiresolution : bool, default True
@@ -53,7 +102,8 @@ class SpinWaveletTransform:
     real : bool, default False
         Whether the signal is real (spin 0): half the work and memory.
     tiling : Tiling, optional
-        Kernels to use instead of the scale-discretised ones of ``dilation`` and ``lowest_scale``.
+        Kernels to use instead of the scale-discretised ones of ``dilation`` and ``lowest_scale``,
+        which then tell the tiling's own (2.0 where it has no dilation).
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
 
@@ -91,8 +141,8 @@ class SpinWaveletTransform:
         spin: int = 0,
         directions: int = 1,
         *,
-        dilation: float = 2.0,
-        lowest_scale: int = 0,
+        dilation: float | None = None,
+        lowest_scale: int | None = None,
         sampling: str | Sampling = "mw",
         multiresolution: bool = True,
         real: bool = False,
@@ -101,14 +151,7 @@ class SpinWaveletTransform:
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         grid = resolve_sampling(sampling, bandlimit)
-        if tiling is None:
-            tiling = ScaleDiscretisedTiling(bandlimit, dilation=dilation, lowest_scale=lowest_scale)
-        elif tiling.bandlimit != bandlimit:
-            msg = (
-                f"tiling has bandlimit {tiling.bandlimit} but the transform has {bandlimit}; "
-                "make the tiling with the transform's bandlimit."
-            )
-            raise ParameterError(msg)
+        tiling = _resolve_tiling(tiling, bandlimit, dilation, lowest_scale)
         wavelets = Wavelets(tiling, Directionality(directions), spin)
         # Checks spin, real and threads.
         harmonic = SpinHarmonicTransform(bandlimit, spin, sampling=grid, real=real, threads=threads)
@@ -116,11 +159,11 @@ class SpinWaveletTransform:
             bandlimit,
             harmonic.spin,
             int(directions),
-            float(getattr(tiling, "dilation", dilation)),
+            float(getattr(tiling, "dilation", 2.0)),
             tiling.lowest_scale,
             grid,
-            bool(multiresolution),
-            bool(real),
+            check_flag(multiresolution, "multiresolution"),
+            harmonic.real,
             tiling,
             threads,
         )
@@ -178,7 +221,7 @@ class SpinWaveletTransform:
 
     @property
     def _parameters(self) -> dict[str, Any]:
-        return {
+        found: dict[str, Any] = {
             "bandlimit": self.bandlimit,
             "spin": self.spin,
             "directions": self.directions,
@@ -188,6 +231,10 @@ class SpinWaveletTransform:
             "multiresolution": self.multiresolution,
             "real": self.real,
         }
+        plain = ScaleDiscretisedTiling
+        if type(self._tiling) is not plain or self._tiling.quadrature != "exact":
+            found["tiling"] = _tiling_text(self._tiling)
+        return found
 
     def grid_of(self, bandlimit: int) -> Sampling:
         """Return the grid for coefficients of a bandlimit: the full one without multiresolution."""
@@ -208,7 +255,12 @@ class SpinWaveletTransform:
         factor = np.sqrt(4 * np.pi / (2 * el + 1)) * self.wavelets.scaling_harmonics[:size]
         return np.repeat(factor, 2 * el + 1)
 
-    def _sums(self, scale: int) -> tuple[GridSums, Array, int]:
+    def _workspace(self) -> Array:
+        """Return room for the Fourier columns of any scale."""
+        largest = max(self._sums(j)[0].workspace_size for j in self.scales)
+        return np.empty(largest, dtype=np.complex128)
+
+    def _sums(self, scale: int, workspace: Array | None = None) -> tuple[GridSums, Array, int]:
         """Return the sums of one scale, conj(psi) padded to its grid, and its lowest degree."""
         directionality = self.wavelets.directionality
         orders = directionality.orders
@@ -227,32 +279,25 @@ class SpinWaveletTransform:
             np.ascontiguousarray(mixing),
             self.real,
             resolve_threads(self.threads),
+            workspace,
         )
         return sums, weights, min(lowest, grid.bandlimit)
 
-    def _scale_to_grid(self, flm: Array, scale: int, *, adjoint: bool) -> Array:
-        sums, weights, lowest = self._sums(scale)
+    def _scale_to_grid(self, flm: Array, scale: int, workspace: Array, *, adjoint: bool) -> Array:
+        sums, weights, lowest = self._sums(scale, workspace)
         size = sums.sampling.bandlimit**2
         batch = flm.reshape(-1, flm.shape[-1])
-        factor = 2 * np.pi / self.directions if adjoint else 1.0
-        maps = None
-        for i, one in enumerate(batch):
-            found = sums.to_grid(
-                one[None, :size], weights * factor, lowest=lowest, quadrature=adjoint
-            )
-            if batch.shape[0] == 1:
-                maps = found[None]
-                break
-            if maps is None:
-                maps = np.empty((batch.shape[0], *found.shape), dtype=found.dtype)
-            maps[i] = found
-        shape = self.shapes[scale]
-        if maps is None:
-            maps = np.empty((0, *shape), dtype=np.float64 if self.real else np.complex128)
-        return maps.reshape(*flm.shape[:-1], *shape)
+        if adjoint:
+            weights = weights * (2 * np.pi / self.directions)
+        maps = np.empty((batch.shape[0], *sums.maps_shape), dtype=sums.maps_dtype)
+        for one, out in zip(batch, maps, strict=True):
+            sums.to_grid(one[None, :size], weights, lowest=lowest, quadrature=adjoint, out=out)
+        return maps.reshape(*flm.shape[:-1], *self.shapes[scale])
 
-    def _add_scale(self, values: Array, scale: int, flm: Array, *, adjoint: bool) -> None:
-        sums, weights, lowest = self._sums(scale)
+    def _add_scale(
+        self, values: Array, scale: int, flm: Array, workspace: Array, *, adjoint: bool
+    ) -> None:
+        sums, weights, lowest = self._sums(scale, workspace)
         factor = 1.0 if adjoint else 2 * np.pi / self.directions
         size = sums.sampling.bandlimit**2
         for one, out in zip(values.reshape(-1, *values.shape[-3:]), flm, strict=True):
@@ -265,11 +310,12 @@ class SpinWaveletTransform:
             )
 
     def _decompose(self, flm: Array, *, adjoint: bool) -> WaveletCoefficients:
-        flm = check_flm(flm, self.bandlimit)
+        flm = writable(check_flm(flm, self.bandlimit))
         part = flm[..., : self._scaling_factor.size] * self._scaling_factor
         transform = self._scaling_transform
         scaling = transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
-        wavelets = {j: self._scale_to_grid(flm, j, adjoint=adjoint) for j in self.scales}
+        workspace = self._workspace()
+        wavelets = {j: self._scale_to_grid(flm, j, workspace, adjoint=adjoint) for j in self.scales}
         return WaveletCoefficients(scaling, wavelets, self._parameters)
 
     def _recompose(
@@ -284,9 +330,10 @@ class SpinWaveletTransform:
         wanted = set(self.shapes) if parts is None else self._checked_parts(parts)
         flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
+        workspace = self._workspace()
         for j in self.scales:
             if j in wanted:
-                self._add_scale(checked[j], j, rows, adjoint=adjoint)
+                self._add_scale(checked[j], j, rows, workspace, adjoint=adjoint)
         if self.real:
             fill_negative_orders(rows)
         if "scaling" in wanted:
@@ -297,8 +344,12 @@ class SpinWaveletTransform:
 
     def _checked_parts(self, parts: Collection[int | str]) -> set[int | str]:
         known = set(self.shapes)
-        if not set(parts) <= known:
-            msg = f"parts={tuple(parts)!r} must be among 'scaling' and the scales {self.scales}."
+        is_list = isinstance(parts, Collection) and not isinstance(parts, str)
+        if not is_list or not all(isinstance(part, Hashable) and part in known for part in parts):
+            msg = (
+                f"parts={parts!r} must be among 'scaling' and the scales {self.scales}; "
+                "pass a tuple of them."
+            )
             raise ParameterError(msg)
         return set(parts)
 
@@ -320,7 +371,19 @@ class SpinWaveletTransform:
             values = coefficients.scaling if key == "scaling" else coefficients[int(key)]
             name = "scaling part" if key == "scaling" else f"scale {key}"
             found[key] = check_map(values, shape, real=self.real, name=name)
+        self._check_parameters(coefficients)
         return found
+
+    def _check_parameters(self, coefficients: WaveletCoefficients) -> None:
+        """Refuse coefficients of other wavelets that happen to have the same shapes."""
+        ours, theirs = self._parameters, coefficients.parameters
+        for name in sorted((set(ours) | set(theirs)) - _FREE):
+            if ours.get(name) != theirs.get(name):
+                msg = (
+                    f"coefficients have {name}={theirs.get(name)!r} but the transform has "
+                    f"{ours.get(name)!r}; use the transform that made them."
+                )
+                raise ParameterError(msg)
 
     def analysis_harmonic(self, flm: Array) -> WaveletCoefficients:
         """Compute wavelet coefficients from harmonic coefficients.
@@ -356,7 +419,9 @@ class SpinWaveletTransform:
         Parameters
         ----------
         coefficients : WaveletCoefficients
-            As `analysis` returns them, or changed.
+            As `analysis` returns them, or changed. They may come from a transform of another spin,
+            or of real signals, and of none that differs in anything else: the real and imaginary
+            parts of a spin-2 analysis are scalar coefficients of E and B.
         parts : collection of int or "scaling", optional
             The scales to add up; all, and the scaling part, when None.
 
@@ -370,7 +435,9 @@ class SpinWaveletTransform:
         ShapeError
             If scales or shapes are not the transform's.
         DataError
-            If a value is not a finite number.
+            If a value is not a finite number, or is complex with ``real``.
+        ParameterError
+            If the parameters are those of other wavelets, or a part is not known.
         """
         return self._spin_part(self._recompose(coefficients, adjoint=False, parts=parts))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 
 import numpy as np
 import pytest
@@ -13,6 +14,14 @@ from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import assert_close, random_flm
 
 PARAMETERS = {"bandlimit": 8, "spin": 2, "directions": 2, "sampling": "mw"}
+
+
+COPIES = [
+    WaveletCoefficients.copy,
+    copy.copy,
+    copy.deepcopy,
+    lambda one: pickle.loads(pickle.dumps(one)),
+]
 
 
 def random_values(shape, seed):
@@ -72,7 +81,7 @@ def test_numbers_multiply_from_both_sides(factor):
         assert_equal(product, one.scaling * factor, {j: one[j] * factor for j in one})
 
 
-@pytest.mark.parametrize("divisor", [2, -0.5, 1j, np.float64(3)])
+@pytest.mark.parametrize("divisor", [2, -0.5, 1j, np.float64(3), np.array(2.0)])
 def test_numbers_divide(divisor):
     one = make()
     assert_equal(one / divisor, one.scaling / divisor, {j: one[j] / divisor for j in one})
@@ -97,12 +106,30 @@ def test_factors_name_scales_that_are_held(key):
         make() * {key: 1.0}
 
 
-@pytest.mark.parametrize("other", [np.ones(3), [1, 2], np.ones((4, 7)), None])
+@pytest.mark.parametrize("factor", [np.ones((3, 3)), np.ones(2), np.ones((1, 1, 1, 1))])
+@pytest.mark.parametrize("key", ["scaling", 1])
+def test_factors_fit_their_scale(key, factor):
+    """A factor may not add axes or change their lengths either."""
+    name = "the scaling part" if key == "scaling" else "scale 1"
+    with pytest.raises(ShapeError, match=f"factor for {name} has shape .*; it must be a number or"):
+        make() * {key: factor}
+
+
+@pytest.mark.parametrize("other", [np.ones(3), [1, 2], np.ones((4, 7)), None, "a", np.array("a")])
 def test_arrays_and_lists_do_not_multiply(other):
     with pytest.raises(TypeError):
         make() * other
     with pytest.raises(TypeError):
         other * make()
+    with pytest.raises(TypeError):
+        make() / other
+
+
+def test_coefficients_do_not_multiply_each_other():
+    with pytest.raises(TypeError):
+        make() * make()
+    with pytest.raises(TypeError):
+        make() / make()
 
 
 @pytest.mark.parametrize("other", [1, 0.0, np.ones(3), None, {}])
@@ -150,10 +177,16 @@ def test_map_keeps_shapes():
         make().map(lambda values: values if values.size == 1 else values[..., :1])
 
 
-@pytest.mark.parametrize("make_copy", [WaveletCoefficients.copy, copy.copy])
-def test_a_copy_has_the_same_numbers(make_copy):
-    one = make()
-    assert_equal(make_copy(one), one.scaling, {j: one[j] for j in one})
+@pytest.mark.parametrize("make_copy", COPIES)
+@pytest.mark.parametrize("batch", [(), (3,), (0,)])
+def test_a_copy_has_the_same_numbers_and_parameters(make_copy, batch):
+    """A pickle too, so that other processes can have them."""
+    one = make(batch)
+    other = make_copy(one)
+    assert_equal(other, one.scaling, {j: one[j] for j in one})
+    assert other.parameters == one.parameters
+    assert not other.scaling.flags.writeable
+    assert not any(other[j].flags.writeable for j in other)
 
 
 def test_a_copy_has_arrays_of_its_own():
@@ -167,6 +200,32 @@ def test_a_copy_has_arrays_of_its_own():
 def test_a_scale_that_is_not_held_is_named(scale):
     with pytest.raises(ParameterError, match=r"scale=.* is not held; the scales are \(1, 3\)"):
         make()[scale]
+
+
+def test_arrays_are_read_only():
+    """Two results may share an array: a change of one would be a change of the other."""
+    one = make()
+    for values in (one.scaling, one[1], one.map(lambda v: v)[3], (2 * one)[1], one.copy().scaling):
+        with pytest.raises(ValueError, match="read-only"):
+            values[...] = 0
+
+
+def test_arrays_of_the_caller_stay_writable_and_are_not_copied():
+    scaling, wavelets = np.zeros((1, 1)), {0: np.zeros((2, 1, 1))}
+    one = WaveletCoefficients(scaling, wavelets, PARAMETERS)
+    assert np.shares_memory(one.scaling, scaling)
+    assert np.shares_memory(one[0], wavelets[0])
+    assert scaling.flags.writeable
+    assert wavelets[0].flags.writeable
+
+
+def test_masked_arrays_are_refused():
+    """Values under a mask would be taken for coefficients."""
+    masked = np.ma.array(np.zeros((2, 1, 3)), mask=np.ones((2, 1, 3)))
+    with pytest.raises(DataError, match="scale 0 has masked entries"):
+        WaveletCoefficients(np.zeros((1, 1)), {0: masked}, PARAMETERS)
+    with pytest.raises(DataError, match="scaling part has masked entries"):
+        WaveletCoefficients(masked[0], {}, PARAMETERS)
 
 
 def test_parameters_are_read_only():
@@ -223,6 +282,12 @@ def test_steering_keeps_the_batch():
 @pytest.mark.parametrize("angle", [np.nan, np.inf])
 def test_steering_takes_finite_angles(angle):
     with pytest.raises(DataError, match="must be finite; give it in radians"):
+        make().steer(angle)
+
+
+@pytest.mark.parametrize("angle", ["a", None, 1j, True, np.zeros((2, 2)), [0.1]])
+def test_steering_takes_one_angle(angle):
+    with pytest.raises(ParameterError, match=r"(?s)angle=.* must be one real number, in radians"):
         make().steer(angle)
 
 

@@ -5,16 +5,26 @@ from __future__ import annotations
 import copy
 import pickle
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, dataclass
 
 import numpy as np
 import pytest
 
 from spinsdw.coefficients import WaveletCoefficients
+from spinsdw.compiled import order_sums
 from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.maps_io import read_coefficients, write_coefficients
+from spinsdw.ring_transform import HealpixTransform
 from spinsdw.sampling import MW, MWSS
 from spinsdw.spin_transform import SpinHarmonicTransform
-from spinsdw.tiling import ScaleDiscretisedTiling
+from spinsdw.tiling import (
+    CustomTiling,
+    HybridTiling,
+    NeedletTiling,
+    ScaleDiscretisedTiling,
+    SplineTiling,
+    Tiling,
+)
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wigner_transform import WignerTransform
 from tests.helpers import (
@@ -364,6 +374,14 @@ def test_parts_of_a_synthesis_add_up(part):
     assert not np.any(transform.synthesis_harmonic(coefficients, parts=()))
 
 
+@pytest.mark.parametrize("parts", [3, "scaling", 0.5, [[1]], [np.arange(2)]])
+def test_parts_are_a_collection_of_parts(parts):
+    transform = SpinWaveletTransform(8)
+    coefficients = transform.analysis_harmonic(random_flm(8))
+    with pytest.raises(ParameterError, match=r"parts=.* must be among 'scaling' and the scales"):
+        transform.synthesis_harmonic(coefficients, parts=parts)
+
+
 @pytest.mark.parametrize("part", ["wavelets", 99, -1, None])
 def test_parts_are_those_of_the_transform(part):
     transform = SpinWaveletTransform(8)
@@ -505,6 +523,27 @@ def test_tiling_may_be_given():
     assert (given.dilation, given.lowest_scale) == (3.0, 1)
 
 
+@pytest.mark.parametrize("tiling", ["s2let", 3, ScaleDiscretisedTiling])
+def test_tiling_is_a_tiling(tiling):
+    with pytest.raises(ParameterError, match=r"tiling=.* must be a Tiling"):
+        SpinWaveletTransform(8, tiling=tiling)
+
+
+@pytest.mark.parametrize("option", [{"dilation": 2.0}, {"lowest_scale": 0}])
+def test_a_tiling_has_its_own_dilation_and_lowest_scale(option):
+    """They were ignored without a word."""
+    with pytest.raises(ParameterError, match="cannot be given with a tiling, which has its own"):
+        SpinWaveletTransform(8, tiling=ScaleDiscretisedTiling(8), **option)
+
+
+@pytest.mark.parametrize("value", ["no", 1, 0, None])
+@pytest.mark.parametrize("name", ["real", "multiresolution"])
+def test_flags_are_true_or_false(name, value):
+    """The text "no" counted as true."""
+    with pytest.raises(ParameterError, match=rf"{name}=.* must be True or False"):
+        SpinWaveletTransform(8, **{name: value})
+
+
 def test_tiling_of_another_bandlimit_is_refused():
     with pytest.raises(ParameterError, match="tiling has bandlimit 8 but the transform has 16"):
         SpinWaveletTransform(16, tiling=ScaleDiscretisedTiling(8))
@@ -528,19 +567,19 @@ def test_directions_are_an_integer_up_to_the_bandlimit(directions):
         SpinWaveletTransform(8, 0, directions)
 
 
-@pytest.mark.parametrize("dilation", [1, 0.5, -2, np.nan, np.inf, "2", None, True])
+@pytest.mark.parametrize("dilation", [1, 0.5, -2, np.nan, np.inf, "2", True])
 def test_dilation_exceeds_one(dilation):
     with pytest.raises(ParameterError, match=r"dilation=.* must"):
         SpinWaveletTransform(8, dilation=dilation)
 
 
-@pytest.mark.parametrize("lowest_scale", [-1, 1.5, True, "0", None, 20])
+@pytest.mark.parametrize("lowest_scale", [-1, 1.5, True, "0", 20])
 def test_lowest_scale_is_an_integer_with_a_scale_above(lowest_scale):
     with pytest.raises(ParameterError, match=r"lowest_scale=.* must"):
         SpinWaveletTransform(8, lowest_scale=lowest_scale)
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, "a", "2", [1], np.nan, np.inf])
 def test_threads_are_a_positive_integer(threads):
     with pytest.raises(ParameterError, match=r"threads=.* must be a positive integer, or None"):
         SpinWaveletTransform(8, threads=threads)
@@ -623,7 +662,7 @@ def test_coefficients_that_are_not_finite_are_refused(name):
     wavelets = {j: coefficients[j].copy() for j in coefficients.scales}
     wavelets[2][0, 1, 1] = np.nan
     broken = WaveletCoefficients(coefficients.scaling, wavelets, coefficients.parameters)
-    with pytest.raises(DataError, match="scale 2 has 1 values that are not finite"):
+    with pytest.raises(DataError, match="scale 2 has 1 value that is not finite"):
         getattr(transform, name)(broken)
 
 
@@ -632,3 +671,128 @@ def test_complex_coefficients_are_not_real(name):
     coefficients = SpinWaveletTransform(8).analysis_harmonic(random_flm(8))
     with pytest.raises(DataError, match="scaling part is complex but real=True was asked for"):
         getattr(SpinWaveletTransform(8, real=True), name)(coefficients)
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+def test_coefficients_of_another_dilation_are_refused(name):
+    """Scales and shapes are the same, the wavelets are not: synthesis was off by 7e-4."""
+    coefficients = SpinWaveletTransform(8, 2, 3).analysis_harmonic(random_flm(8, 2))
+    other = SpinWaveletTransform(8, 2, 3, dilation=1.99)
+    with pytest.raises(ParameterError, match=r"have dilation=2\.0 but the transform has 1\.99"):
+        getattr(other, name)(coefficients)
+
+
+@dataclass(frozen=True)
+class Halves(Tiling):
+    """Everything in one scale: a tiling such as a user may write."""
+
+    bandlimit: int
+    lowest_scale: int = 0
+    highest_scale = 0
+    scaling_bandlimit = 1
+
+    def scale_bandlimit(self, scale):  # noqa: ARG002
+        return self.bandlimit
+
+    def scale_lowest_degree(self, scale):  # noqa: ARG002
+        return 1
+
+    def _profiles(self):
+        scaling, wavelets = np.zeros(self.bandlimit), np.ones((1, self.bandlimit))
+        scaling[0], wavelets[0, 0] = 1, 0
+        return scaling, wavelets
+
+
+def custom_tiling(share):
+    """One scale of degrees 1 to 7, and a share of degree 1 left to the scaling function."""
+    scaling, wavelets = np.zeros(8), np.ones((1, 8))
+    scaling[:2], wavelets[0, :2] = (1, share), (0, np.sqrt(1 - share**2))
+    return CustomTiling(scaling, wavelets)
+
+
+TILINGS = [
+    ScaleDiscretisedTiling(8),
+    ScaleDiscretisedTiling(8, dilation=1.99),
+    ScaleDiscretisedTiling(8, quadrature="s2let"),
+    NeedletTiling(8),
+    SplineTiling(8),
+    HybridTiling(8, dilations=(2.0,)),
+    HybridTiling(8, dilations=(2.0, 1.9), transitions=(4,)),
+    custom_tiling(0.6),
+    custom_tiling(0.61),
+    Halves(8),
+]
+
+
+def test_coefficients_know_the_tiling_that_made_them():
+    """Of each tiling the parameters are its own, and the same every time."""
+    kept = []
+    for tiling in TILINGS:
+        one = SpinWaveletTransform(8, tiling=tiling).analysis_harmonic(random_flm(8))
+        again = SpinWaveletTransform(8, tiling=copy.deepcopy(tiling))
+        assert_close(again.synthesis_harmonic(one), random_flm(8), ulps=tolerance(8))
+        assert dict(one.parameters) not in kept
+        kept.append(dict(one.parameters))
+
+
+@pytest.mark.parametrize("tiling", TILINGS)
+def test_coefficients_of_another_tiling_are_refused_from_a_file_too(tiling, tmp_path):
+    transform = SpinWaveletTransform(8, 2, 3, tiling=tiling)
+    flm = random_flm(8, 2)
+    path = write_coefficients(tmp_path / "w.fits", transform.analysis_harmonic(flm))
+    found = read_coefficients(path)
+    assert_close(transform.synthesis_harmonic(found), flm, ulps=tolerance(8))
+    for other in TILINGS:
+        if other is not tiling:
+            with pytest.raises((ParameterError, ShapeError), match=r"coefficients have|has shape"):
+                SpinWaveletTransform(8, 2, 3, tiling=other).synthesis_harmonic(found)
+
+
+def test_the_tiling_by_default_may_be_given():
+    """What dilation and lowest_scale say needs no name of its own."""
+    named = SpinWaveletTransform(8, 2, dilation=1.9, lowest_scale=1)
+    given = SpinWaveletTransform(
+        8, 2, tiling=ScaleDiscretisedTiling(8, dilation=1.9, lowest_scale=1)
+    )
+    flm = random_flm(8, 2)
+    found = given.synthesis_harmonic(named.analysis_harmonic(flm))
+    assert np.array_equal(found, named.synthesis_harmonic(named.analysis_harmonic(flm)))
+
+
+@pytest.mark.parametrize("part", [np.real, np.imag])
+def test_parts_of_a_spin_analysis_may_be_synthesised_as_real_scalars(part):
+    """E and B: the coefficients of another spin, and real, are taken."""
+    coefficients = SpinWaveletTransform(8, 2, 3).analysis_harmonic(random_flm(8, 2)).map(part)
+    real = SpinWaveletTransform(8, 0, 3, real=True).synthesis_harmonic(coefficients)
+    full = SpinWaveletTransform(8, 0, 3).synthesis_harmonic(coefficients)
+    assert_close(real, full, ulps=tolerance(8))
+
+
+@needs_compiler
+@pytest.mark.parametrize("spin", [0, 2])
+def test_read_only_arrays_are_not_compiled_for(spin):
+    """To the compiler a read-only array is another type: it took seconds at the first of them."""
+    kernels = (order_sums.fill_columns, order_sums.add_columns_to_harmonics)
+    flm = random_flm(8, spin)
+    unaligned = np.frombuffer(b"1" + flm.tobytes(), dtype=complex, offset=1)
+    flm.flags.writeable = False
+    kinds = (flm.copy(), flm, np.broadcast_to(flm, (2, 64)), unaligned)
+    counts = []
+    for given in kinds:
+        for transform in (
+            SpinHarmonicTransform(8, spin),
+            HealpixTransform(4, 8, spin),
+            SpinWaveletTransform(8, spin, 2),
+        ):
+            found = (
+                transform.synthesis(transform.analysis_harmonic(given))
+                if isinstance(transform, SpinWaveletTransform)
+                else transform.synthesis(given)
+            )
+            found.flags.writeable = False
+            transform.adjoint_synthesis(found)
+        functions = WignerTransform(8, (spin,)).synthesis(given[..., None, :])
+        functions.flags.writeable = False
+        WignerTransform(8, (spin,)).analysis(functions)
+        counts.append([len(kernel.signatures) for kernel in kernels])
+    assert counts[1:] == counts[:-1]
