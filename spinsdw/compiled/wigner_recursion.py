@@ -20,6 +20,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from spinsdw.compiled.jit import kernel
 
 __all__ = [
@@ -41,6 +43,7 @@ _STEP = 800
 _FLOOR = -160
 _SHRINK = 2.0**-_STEP
 _SMALLEST = 2.0**_FLOOR
+_POWERS_OF_TWO = 2.0 ** np.arange(_FLOOR, _STEP + _FLOOR + 1)
 _LIMIT = 2.0 ** (_STEP + _FLOOR)
 _RENORM = 2.0**256
 _UNRENORM = 2.0**-256
@@ -51,21 +54,25 @@ def fill_recursion(m, n, L, root, inverse, a, b, scale):
     """Fill a_l, b_l, scale_l, max(m, |n|) <= l < L, from root[k] = sqrt(k), inverse[k] = 1 / k."""
     n_abs = abs(n)
     first = max(m, n_abs)
-    scale[first] = 1.0
-    w, before, mn = 1.0, 1.0, float(m) * float(n)
+    mn = float(m) * float(n)
+    # Three loops that vectorise around the one that cannot; b holds w_{l+1} until the last.
     for el in range(first, L):
-        w_next = (
+        b[el] = (
             (root[el + 1 - m] * root[el + 1 + m])
             * (root[el + 1 - n_abs] * root[el + 1 + n_abs])
             * inverse[el + 1]
         )
-        now = scale[el]
-        following = 1.0 if el == first else before * w / w_next
+    for el in range(first + 1, L):
+        a[el] = b[el - 1] / b[el]
+    scale[first] = 1.0
+    scale[first + 1] = 1.0
+    for el in range(first + 1, L):
+        scale[el + 1] = scale[el - 1] * a[el]
+    for el in range(first, L):
         # From the scales as they were rounded: so their errors are no errors of the recursion.
-        a[el] = (2 * el + 1) * now / (w_next * following)
-        b[el] = -a[el] * mn * inverse[el] * inverse[el + 1]
-        scale[el + 1] = following
-        before, w = now, w_next
+        value = (2 * el + 1) * scale[el] / (b[el] * scale[el + 1])
+        a[el] = value
+        b[el] = -value * mn * inverse[el] * inverse[el + 1]
 
 
 @kernel
@@ -120,22 +127,23 @@ def start_norm(M, K, central):
 
 
 @kernel
-def _fill_small_start(power, before, now, scale):
-    """Give rings their exponents: now holds the mantissas, the true values are now 2**power."""
+def _fill_small_start(power, now, scale):
+    """Give rings their exponents: now holds the mantissas, the true values are now 2**power.
+
+    Powers are multiples of 256. A mantissa is brought below 1 first: then a negative power means a
+    value below 2**-256, out of range, and the others are in range.
+    """
     inside = 0
     for r in range(now.size):
-        before[r] = 0.0
-        scale[r] = 0.0
+        is_large = abs(now[r]) > 1.0
+        value = now[r] * (_UNRENORM if is_large else 1.0)
+        exponent = power[r] + (256.0 if is_large else 0.0)
         # A pole, where d^l0 is exactly zero, stays zero at every later degree.
-        if now[r] != 0.0:
-            mantissa, exponent = math.frexp(now[r])
-            exponent += int(power[r])
-            if exponent < _FLOOR:
-                step = math.floor((exponent - _FLOOR) / _STEP)
-                scale[r] = step
-                exponent -= _STEP * int(step)
-            now[r] = math.ldexp(mantissa, exponent)
-        inside += 1 if scale[r] == 0.0 else 0
+        exponent = exponent if value != 0.0 else 0.0
+        steps = math.floor((exponent - _FLOOR) / _STEP) if exponent < 0.0 else 0.0
+        now[r] = value * _POWERS_OF_TWO[int(exponent - _STEP * steps) - _FLOOR]
+        scale[r] = steps
+        inside += 1 if steps == 0.0 else 0
     return inside
 
 
@@ -155,7 +163,7 @@ def fill_start(norm, norm_power, powers, first, before, now, scale, power):
         before[r] = 0.0
         scale[r] = 0.0
         small += 1 if abs(value) < _SMALLEST or exponent != 0.0 else 0
-    return _fill_small_start(power, before, now, scale) if small > 0 else now.size
+    return _fill_small_start(power, now, scale) if small > 0 else now.size
 
 
 @kernel

@@ -20,9 +20,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from spinsdw.fourier import from_series, to_series
 from spinsdw.parallel import run_tasks
 from spinsdw.sampling.base import Sampling
+from spinsdw.sampling.half_step import HalfStep, modes
 
 __all__ = ["MW", "MWSS"]
 
@@ -32,27 +32,13 @@ Array = np.ndarray[Any, Any]
 _BATCH_SIZE = 2**14
 
 
-def _modes(size: int) -> Array:
-    """Return 0, 1, .., -1: the mode of each place of a Fourier series."""
-    k = np.arange(size)
-    return np.where(2 * k < size, k, k - size)
-
-
 def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array]:
     """|sin(theta)| up to degree 2 L - 2, at theta = first + 2 pi t / size and half a step on."""
-    degree = _modes(2 * size)
+    degree = modes(2 * size)
     even = (degree % 2 == 0) & (np.abs(degree) <= 2 * bandlimit - 2)
     series = np.where(even, 2 / (np.pi * (1 - np.where(even, degree, 0.0) ** 2)), 0.0)
     values = np.fft.ifft(series * np.exp(1j * degree * first)).real * (2 * size)
     return np.ascontiguousarray(values[::2]), np.ascontiguousarray(values[1::2])
-
-
-def _shift_phases(size: int) -> Array:
-    """Factors exp(i k pi / size) of a shift by half a step; the Nyquist term carries nothing."""
-    phases = np.exp(1j * np.pi * _modes(size) / size)
-    if size % 2 == 0:
-        phases[size // 2] = 0.0
-    return phases
 
 
 @dataclass(frozen=True)
@@ -67,27 +53,24 @@ class _Equiangular(Sampling):
         return 2 * self.bandlimit - self._offset
 
     @functools.cached_property
-    def _weights(self) -> tuple[Array, Array, Array]:
+    def _weights(self) -> tuple[Array, Array]:
         size = self.n_phi
         here, between = _sine_weights(self.bandlimit, size, float(self.colatitudes[0]))
         # 2 pi / P of the ring sums, pi / C of the circle, 1 / 2 of the two grids.
         factor = np.pi**2 / size**2
-        # 1 / size**2: the two inverse transforms are not normalised.
-        return here * factor, between * factor / size**2, _shift_phases(size)
+        return here * factor, between * factor
+
+    @functools.cached_property
+    def _half_step(self) -> HalfStep:
+        return HalfStep(self.n_phi)
 
     def _project(self, circles: Array) -> None:
-        """Circles <- (w_A + S^T w_B S) circles, times the constants."""
-        here, between, phases = self._weights
-        work, shifted = np.empty_like(circles), np.empty_like(circles)
-        to_series(circles, work)
-        work *= phases
-        from_series(work, shifted)
+        """Replace circles by (w_A + S^T w_B S) circles, times the constants."""
+        here, between = self._weights
+        shifted = self._half_step.shift(circles)
         shifted *= between
-        to_series(shifted, work)
-        work *= phases.conj()
-        from_series(work, shifted)
         circles *= here
-        circles += shifted
+        circles += self._half_step.shift_back(shifted)
 
     def _weigh_batch(
         self, columns: Array, mixing: Array, parities: Array, pairs: tuple[Array, Array]
