@@ -1,9 +1,9 @@
-"""Measure spinsdw against its peers: ``python benchmarks/run.py --full``.
+"""Measure spinsdw against its peers: ``python benchmarks/run.py --standard``.
 
 Every job's rows are printed as they come and written to a JSON file after each job, with the
 machine, the versions and the date; ``python benchmarks/report.py`` makes the documentation's tables
-and figures from that of the full run. ``--full`` takes about an hour on two cores and 8 GB of
-memory, ``--quick`` a minute or two. Nothing else should run meanwhile. Jobs that are named are
+and figures from that of a standard or full run. ``--full`` takes about an hour on two cores and
+8 GB of memory, ``--standard`` a quarter of that, ``--quick`` a minute or two. Nothing else should run meanwhile. Jobs that are named are
 measured alone and join the others in the file.
 """
 
@@ -142,11 +142,12 @@ def _arguments() -> argparse.Namespace:
         size.add_argument(f"--{name}", dest="plan", action="store_const", const=name)
     parser.set_defaults(plan="quick")
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of threads, such as 1 2")
-    parser.add_argument("--output", type=Path, help=f"{RESULTS.name} for --full, or in build/")
+    parser.add_argument("--output", type=Path, help=f"{RESULTS.name} for --standard and --full, or in build/")
     choices = parser.parse_args()
     if choices.output is None:
-        # The results that are kept are those of the full run alone.
-        choices.output = RESULTS if choices.plan == "full" else OTHER_RESULTS
+        # The results that are kept are never those of a quick run.
+        kept = choices.plan in {"standard", "full"}
+        choices.output = RESULTS if kept else OTHER_RESULTS
     unknown = set(choices.jobs) - set(JOBS)
     if unknown:
         parser.error(f"jobs {sorted(unknown)} are not among {', '.join(JOBS)}")
