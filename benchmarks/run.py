@@ -3,8 +3,8 @@
 Every job's rows are printed as they come and written to a JSON file after each job, with the
 machine, the versions and the date; ``python benchmarks/report.py`` makes the documentation's tables
 and figures from that of a standard or full run. ``--full`` takes about an hour on two cores and
-8 GB of memory, ``--standard`` a quarter of that, ``--quick`` a minute or two. Nothing else should run meanwhile. Jobs that are named are
-measured alone and join the others in the file.
+8 GB of memory, ``--standard`` some ten minutes, ``--quick`` a minute or two. Nothing else should
+run meanwhile. Jobs that are named are measured alone and join the others in the file.
 """
 
 from __future__ import annotations
@@ -142,7 +142,9 @@ def _arguments() -> argparse.Namespace:
         size.add_argument(f"--{name}", dest="plan", action="store_const", const=name)
     parser.set_defaults(plan="quick")
     parser.add_argument("--threads", type=int, nargs="+", help="numbers of threads, such as 1 2")
-    parser.add_argument("--output", type=Path, help=f"{RESULTS.name} for --standard and --full, or in build/")
+    parser.add_argument(
+        "--output", type=Path, help=f"{RESULTS.name} for --standard and --full, or in build/"
+    )
     choices = parser.parse_args()
     if choices.output is None:
         # The results that are kept are never those of a quick run.

@@ -12,6 +12,7 @@ import numpy as np
 
 from spinsdw.directionality import Directionality
 from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.signals import refuse_masked
 
 __all__ = ["WaveletCoefficients"]
 
@@ -183,7 +184,9 @@ class WaveletCoefficients:
         """
 
         def apply(key: int | str, values: Array) -> Array:
-            result = np.asarray(function(values))
+            found = function(values)
+            refuse_masked(found, "what function returned")
+            result = np.asarray(found)
             if result.shape != values.shape:
                 msg = (
                     f"function turned the shape {values.shape} of {key} into {result.shape}; "

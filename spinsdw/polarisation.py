@@ -15,6 +15,7 @@ from spinsdw.harmonics import check_bandlimit, multiply_by_degree, polarisation_
 from spinsdw.healpix import (
     HealpixFit,
     check_mask,
+    check_nside,
     clean_polarisation,
     nested_to_ring,
     ring_to_nested,
@@ -22,6 +23,7 @@ from spinsdw.healpix import (
 from spinsdw.separation.pseudo import PseudoMethod
 from spinsdw.separation.report import Clock, check_choice
 from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
+from spinsdw.signals import check_flag, refuse_masked
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -76,8 +78,8 @@ class EBMaps:
     E, B : ndarray, float64
         The maps, pixelised as Q and U, in their unit (for ``output="fields"``).
     weight : ndarray, float64
-        Where to trust the maps, from 0 to 1: the weights of all scales, averaged with the power
-        each scale has in E and B.
+        Where to trust the maps, from 0 to 1: the weights of all scales, each counted with the
+        power its weighted coefficients have left. A scale dropped everywhere does not count.
     weights : mapping of int to ndarray
         The same for every scale.
     coefficients : WaveletCoefficients
@@ -101,7 +103,8 @@ class EBSeparator:
     Parameters
     ----------
     bandlimit : int or None, optional
-        L: degrees are l < L. None: 2 nside + 1 on HEALPix, the grid's own on MW and MWSS.
+        L: degrees are l < L. None takes it from the mask: 2 nside + 1 on HEALPix, the grid's own
+        on MW and MWSS.
     mask : ndarray, optional
         1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). None: full sky.
     method : str, default "pseudo"
@@ -110,7 +113,7 @@ class EBSeparator:
         N of the wavelets.
     dilation : float, default 2.0
         Ratio of neighbouring scales.
-    lowest_scale : int, default 2
+    lowest_scale : int, default 2, or the highest scale if that is lower
         Structures larger than scale J0 belong to the scaling part.
     taper : float, default 0.2
         Share of its energy in the hole, in (0, 1], at which a coefficient is dropped.
@@ -169,16 +172,19 @@ class EBSeparator:
             raise ParameterError(msg)
         check_choice("method", method, tuple(_METHODS))
         check_choice("output", output, get_args(Output))
-        if not 0 < taper <= 1:
-            msg = f"taper={taper} must be a share of energy in (0, 1]; 0.2 suits most masks."
+        if not isinstance(taper, int | float | np.number) or not 0 < taper <= 1:
+            msg = f"taper={taper!r} must be a share of energy in (0, 1]; 0.2 suits most masks."
             raise ParameterError(msg)
         weights = None
         if mask is not None:
+            refuse_masked(mask, "mask")
             values = np.asarray(mask)
             sky = sky_of(values, bandlimit, name="mask", threads=threads)
             weights = check_mask(values, values.shape)
             weights.setflags(write=False)
             bandlimit = sky.bandlimit
+            if nest and isinstance(sky, HealpixSky):
+                check_nside(sky.nside, nested=True)
         bandlimit = check_bandlimit(bandlimit)
         if lowest_scale is None:
             lowest_scale = min(
@@ -186,7 +192,7 @@ class EBSeparator:
                 ScaleDiscretisedTiling(bandlimit, dilation=dilation).highest_scale,
             )
         settings = (bandlimit, weights, method, directions, dilation, lowest_scale)
-        parameters = (*settings, float(taper), output, bool(nest), threads)
+        parameters = (*settings, float(taper), output, check_flag(nest, "nest"), threads)
         for item, value in zip(fields(self), parameters, strict=True):
             object.__setattr__(self, item.name, value)
         # What each sky costs to prepare, kept with the separator.
@@ -262,6 +268,8 @@ class EBSeparator:
             If the shape does not fit the bandlimit.
         """
         clock = Clock()
+        refuse_masked(q, "q")
+        refuse_masked(u, "u")
         q, u = np.asarray(q), np.asarray(u)
         if q.shape != u.shape:
             msg = f"q has shape {q.shape} and u {u.shape}, which must be the same."
@@ -315,8 +323,9 @@ class EBSeparator:
 
         Raises
         ------
-        ShapeError
-            If the maps are of another separator.
+        ShapeError, ParameterError
+            If the coefficients are those of another transform. Maps of a separator that differs
+            in mask, taper or output only are not told apart: their bands do not add up.
         """
         sky = self._sky_of(maps.E)
         transform = self._prepared(sky).transform
@@ -356,7 +365,7 @@ class EBSeparator:
         for j in transform.scales:
             weights[j] = position_map(prepared.weights[j].mean(axis=0), transform, j, sky)
             weights[j] *= self._ring_mask > 0
-            power = float(np.mean(np.abs(coefficients[j]) ** 2))
+            power = prepared.sphere_mean((np.abs(coefficients[j]) ** 2).mean(axis=0))
             weight += power * weights[j]
             total += power
         # A map without any power is trusted where its mask is.

@@ -8,7 +8,7 @@ import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
 
-__all__ = ["check_finite", "check_flag", "check_map", "check_spin", "writable"]
+__all__ = ["check_finite", "check_flag", "check_map", "check_spin", "refuse_masked", "writable"]
 
 Array = np.ndarray[Any, Any]
 
@@ -45,6 +45,13 @@ def check_finite(values: Array, name: str) -> None:
         raise DataError(msg)
 
 
+def refuse_masked(values: object, name: str) -> None:
+    """Raise `DataError` for an array of numpy.ma with masked entries: its mask would be lost."""
+    if np.ma.is_masked(values):
+        msg = f"{name} has masked entries, and every value must be known; fill them first."
+        raise DataError(msg)
+
+
 def writable(values: Array) -> Array:
     """Return an array for compiled code: itself, or a copy of a read-only or unaligned one.
 
@@ -55,9 +62,7 @@ def writable(values: Array) -> Array:
 
 def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "map") -> Array:
     """Return maps as a native C-ordered float64 (``real``) or complex128 array, checked."""
-    if np.ma.is_masked(maps):
-        msg = f"{name} has masked entries, and every value must be known; fill them first."
-        raise DataError(msg)
+    refuse_masked(maps, name)
     values = np.asarray(maps)
     if values.dtype.kind not in "biufc":
         msg = f"{name} has dtype {values.dtype}; it must hold real or complex numbers."

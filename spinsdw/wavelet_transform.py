@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -262,6 +262,14 @@ class SpinWaveletTransform:
 
     def _sums(self, scale: int, workspace: Array | None = None) -> tuple[GridSums, Array, int]:
         """Return the sums of one scale, conj(psi) padded to its grid, and its lowest degree."""
+        sums, weights, lowest = self._scale_sums[scale]
+        return replace(sums, workspace=workspace), weights, lowest
+
+    @functools.cached_property
+    def _scale_sums(self) -> dict[int, tuple[GridSums, Array, int]]:
+        return {j: self._make_sums(j) for j in self.scales}
+
+    def _make_sums(self, scale: int) -> tuple[GridSums, Array, int]:
         directionality = self.wavelets.directionality
         orders = directionality.orders
         grid = self.grid_of(self._tiling.scale_bandlimit(scale))
@@ -279,7 +287,6 @@ class SpinWaveletTransform:
             np.ascontiguousarray(mixing),
             self.real,
             resolve_threads(self.threads),
-            workspace,
         )
         return sums, weights, min(lowest, grid.bandlimit)
 

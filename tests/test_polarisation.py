@@ -588,3 +588,30 @@ def test_separator_keeps_the_mask_as_it_was_given():
     q, u = random_qu("healpix")
     again = dataclasses.replace(separator, directions=1)
     assert_same_maps(again.separate(q, u), separator.separate(q, u), 0)
+
+
+@pytest.mark.parametrize("where", ["q", "u", "mask"])
+def test_masked_entries_are_refused(where):
+    """The mask of a numpy masked array is not the mask of the sky, and must not be lost."""
+    arrays = dict(zip("qu", random_qu("healpix"), strict=True)) | {"mask": south("healpix")}
+    arrays[where] = np.ma.masked_less(arrays[where], 0.1)
+    with pytest.raises(DataError, match=f"{where} has masked entries"):
+        EBSeparator(L, arrays["mask"]).separate(arrays["q"], arrays["u"])
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"nest": "no"}, "nest='no' must be True or False"),
+        ({"taper": "a"}, "taper='a' must be a share of energy"),
+        ({"method": np.array(["pseudo", "pure"])}, "is not known; use one of 'pseudo'"),
+    ],
+)
+def test_parameter_of_another_type_is_refused(options, told):
+    with pytest.raises(ParameterError, match=told):
+        EBSeparator(L, **options)
+
+
+def test_nested_mask_needs_a_power_of_two():
+    with pytest.raises(ParameterError, match="nside=3"):
+        EBSeparator(7, np.ones(12 * 3**2), nest=True)

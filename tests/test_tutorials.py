@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers import needs_compiler
+
 TUTORIALS = sorted((Path(__file__).parents[1] / "tutorials").glob("*.py"))
 each_tutorial = pytest.mark.parametrize("path", TUTORIALS, ids=[path.stem for path in TUTORIALS])
 
@@ -33,7 +35,7 @@ def test_tutorial_uses_public_names_only(path):
     assert not [name for name in names if name.startswith("_")]
 
 
-@pytest.mark.slow
+@needs_compiler
 @each_tutorial
 def test_tutorial_runs_without_a_warning(path, tmp_path):
     command = [sys.executable, "-W", "error", str(path)]

@@ -61,8 +61,8 @@ def draw_pictures(
     fields = _style(maps.E, maps.B, trusted, unit=inputs.maps.unit) | {"mask": trusted}
     where = "" if inputs.mask is None else f" where the weight is above {TRUSTED}"
     figures = (
-        mollweide_figure(inputs.maps.q, title="Stokes Q", **stokes),
-        mollweide_figure(inputs.maps.u, title="Stokes U", **stokes),
+        mollweide_figure(inputs.q, title="Stokes Q", **stokes),
+        mollweide_figure(inputs.u, title="Stokes U", **stokes),
         mollweide_figure(mask, title="Mask", unit="weight", limits=(0, 1), colour_map="Blues"),
         mollweide_figure(maps.E, title=f"E{where}", **fields),
         mollweide_figure(maps.B, title=f"B{where}", **fields),

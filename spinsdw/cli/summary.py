@@ -128,8 +128,7 @@ def _kept(maps: EBMaps) -> str:
 
 def _kept_lines(maps: EBMaps) -> Iterator[str]:
     for key, kept in maps.info.kept_fraction.items():
-        # A share of the sky, where there is a map of the weights; else one of the coefficients,
-        # which are denser near the poles.
+        # Of the observed sky where there is a map of the weights: outside the mask it is zero.
         share = kept if isinstance(key, str) else float(np.mean(maps.weights[key]))
         low, high = part_degrees(key, maps.coefficients.parameters)
         name = "scaling" if isinstance(key, str) else f"scale {key}"

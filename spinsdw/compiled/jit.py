@@ -23,7 +23,7 @@ import numba
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["cache_directory", "kernel", "reduction_kernel"]
+__all__ = ["cache_directory", "kernel"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -186,19 +186,10 @@ class PackageCache(caching.FunctionCache):
             self.disable()
 
 
-def _compiled(function: Function, fastmath: set[str]) -> Function:
-    jitted = numba.njit(nogil=True, error_model="numpy", fastmath=fastmath)(function)
+def kernel(function: Function) -> Function:
+    """Compile on first call: no interpreter lock, numpy division, fused multiply-adds allowed."""
+    jitted = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
     folder = None if config.DISABLE_JIT else cache_directory()
     if isinstance(jitted, Dispatcher) and folder is not None:
         jitted._cache = PackageCache(jitted.py_func, folder)
     return jitted
-
-
-def kernel(function: Function) -> Function:
-    """Compile on first call: no interpreter lock, numpy division, fused multiply-adds allowed."""
-    return _compiled(function, _FAST)
-
-
-def reduction_kernel(function: Function) -> Function:
-    """As `kernel`, and sums may be reordered: only for plain sums over many terms."""
-    return _compiled(function, _FAST | {"reassoc"})

@@ -45,6 +45,7 @@ from spinsdw.errors import (
 from spinsdw.harmonics import check_integer, spin_to_eb
 from spinsdw.healpix.pixels import check_nside, nested_to_ring, nside_of
 from spinsdw.healpix.values import bad_pixel_mask, check_mask, clean_polarisation
+from spinsdw.signals import refuse_masked
 
 __all__ = [
     "FitOptions",
@@ -216,6 +217,7 @@ def map_to_flm(  # noqa: PLR0913 - the map, what to fit, and the few choices of 
     nside = nside_of(maps)
     bandlimit = _check_bandlimit(bandlimit, nside)
     _check_stopping(tolerance, max_iterations)
+    refuse_masked(maps, "maps")
     values, weights = _observed(np.asarray(maps), mask, spin)
     if nest:
         values, weights = nested_to_ring(values), nested_to_ring(weights)

@@ -16,6 +16,8 @@ from spinsdw.harmonics import bandlimit_of, is_real_field
 from spinsdw.healpix.alm import REALITY_ULPS
 from spinsdw.healpix.fitting import FitOptions, HealpixFit, map_to_flm
 from spinsdw.healpix.pixels import check_nside, ring_to_nested
+from spinsdw.sampling import Sampling
+from spinsdw.signals import refuse_masked
 
 __all__ = ["flm_to_map", "healpix_to_mw", "mw_to_healpix"]
 
@@ -123,12 +125,16 @@ def mw_to_healpix(
     """
     from spinsdw.spin_transform import SpinHarmonicTransform
 
+    refuse_masked(maps, "maps")
     values = np.asarray(maps)
     is_real = _is_real(values, spin)
     if values.ndim < 2:
         msg = f"maps have shape {values.shape} but must have (..., rings, phi); give grid maps."
         raise ShapeError(msg)
-    bandlimit = values.shape[-2] - (sampling == "mwss")
+    if isinstance(sampling, Sampling):
+        bandlimit = sampling.bandlimit
+    else:
+        bandlimit = values.shape[-2] - (sampling == "mwss")
     grid = SpinHarmonicTransform(bandlimit, spin, sampling=sampling, real=is_real, threads=threads)
     return flm_to_map(grid.analysis(values), nside, spin, real=is_real, threads=threads)
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.signals import refuse_masked
 
 __all__ = [
     "UNSEEN",
@@ -103,6 +104,7 @@ def check_mask(mask: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     >>> check_mask([True, False], (2,)).tolist()
     [1.0, 0.0]
     """
+    refuse_masked(mask, "mask")
     array = np.asarray(mask)
     if array.shape != tuple(shape):
         msg = f"mask has shape {array.shape} but must have {tuple(shape)}, one weight per pixel."
@@ -184,6 +186,7 @@ def clean_polarisation(
 
 def _real_values(values: ArrayLike, name: str) -> FloatArray:
     """Return real input as native float64, or raise DataError."""
+    refuse_masked(values, name)
     array = np.asarray(values)
     if array.dtype.kind not in "buif":
         msg = f"{name} has dtype {array.dtype} but must be real; give Q and U as two arrays."
@@ -197,7 +200,7 @@ def _refuse_non_finite(q: FloatArray, u: FloatArray, weights: FloatArray) -> Non
     if count:
         msg = (
             f"{count} observed pixels of q or u are NaN or infinite and must be finite; "
-            "pass bad_pixels='mask' to mask them."
+            "set the mask to 0 there, or pass bad_pixels='mask' to clean_polarisation."
         )
         raise DataError(msg)
 

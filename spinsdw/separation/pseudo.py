@@ -73,18 +73,20 @@ class PseudoMethod:
         if self.mask is None:
             return dict.fromkeys(self.weights, 1.0)
         return {
-            key: self._sphere_mean(values.reshape(-1, *values.shape[-2:]).mean(axis=0))
+            key: self.sphere_mean(values.reshape(-1, *values.shape[-2:]).mean(axis=0))
             for key, values in self.weights.items()
         }
 
-    def _sphere_mean(self, values: Array) -> float:
+    def sphere_mean(self, values: Array) -> float:
+        """Return the mean over the sphere of non-negative values at the positions of a scale."""
         # Samples crowd at the poles: a plain mean would be one of the poles.
         bandlimit = values.shape[1] // 2 if self.sky.sampling_name == "mwss" else values.shape[0]
         transform = SpinHarmonicTransform(
             bandlimit, sampling=self.sky.sampling_name, real=True, threads=self.transform.threads
         )
         mean = transform.analysis(values)[0].real / np.sqrt(4 * np.pi)
-        return float(np.clip(mean, 0.0, 1.0))
+        # A mean lies between the extremes; the quadrature of rough values may miss that a little.
+        return float(np.clip(mean, values.min(), values.max()))
 
     def apply(self, coefficients: WaveletCoefficients) -> WaveletCoefficients:
         """Weigh the coefficients of the masked map."""

@@ -25,6 +25,6 @@ class Clock:
 
 def check_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
     """Raise `ParameterError` unless a value is one of the names allowed."""
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         msg = f"{name}={value!r} is not known; use one of {', '.join(map(repr, allowed))}."
         raise ParameterError(msg)
