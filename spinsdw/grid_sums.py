@@ -37,13 +37,9 @@ def _engine(sampling: Sampling) -> RingEngine:
 
 def fill_negative_orders(flm: Array) -> None:
     """Complete coefficients known for m >= 0 by f_{l,-m} = (-1)^m conj(f_lm), in place."""
-    bandlimit = int(np.sqrt(flm.shape[-1]))
-    el = np.arange(bandlimit)
-    for m in range(1, bandlimit):
-        base = el[m:] ** 2 + el[m:]
-        flm[..., base - m] = (-1.0) ** m * flm[..., base + m].conj()
-    # Rounding leaves some in place of zero.
-    flm.imag[..., el**2 + el] = 0.0
+    from spinsdw.compiled.symmetry import fill_negative_m
+
+    fill_negative_m(int(np.sqrt(flm.shape[-1])), flm.reshape(-1, flm.shape[-1]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ Array = np.ndarray[Any, Any]
 _NEGLIGIBLE = 45.0
 
 
+@functools.lru_cache(maxsize=128)
 def make_runs(orders: tuple[int, ...], *, symmetric: bool = False, sides: int = 2) -> Array:
     """List the passes of the recursion that serve every series F_n(+-m), n in ``orders``.
 

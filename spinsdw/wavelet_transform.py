@@ -197,7 +197,7 @@ class SpinWaveletTransform:
         """The orientations gamma_k = k pi / N in radians; float64, shape (directions,)."""
         return self.wavelets.directionality.orientations
 
-    @property
+    @functools.cached_property
     def shapes(self) -> dict[int | str, tuple[int, ...]]:
         """Shape of the scaling part and of each scale, for one signal."""
         found: dict[int | str, tuple[int, ...]] = {"scaling": self._scaling_transform.shape}

@@ -41,6 +41,18 @@ def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array
     return np.ascontiguousarray(values[::2]), np.ascontiguousarray(values[1::2])
 
 
+@functools.lru_cache(maxsize=128)
+def _pairs(bandlimit: int, n_phi: int, n_m: int) -> tuple[Array, Array]:
+    """Return places of even m and of odd m, in two arrays of one length, -1 for none."""
+    m = np.arange(n_m)
+    if n_m == n_phi:
+        m = np.where(m < bandlimit, m, m - n_m)
+    even, odd = np.flatnonzero(m % 2 == 0), np.flatnonzero(m % 2 != 0)
+    pairs = np.full((2, max(even.size, odd.size)), -1)
+    pairs[0, : even.size], pairs[1, : odd.size] = even, odd
+    return pairs[0], pairs[1]
+
+
 @dataclass(frozen=True)
 class _Equiangular(Sampling):
     """What MW and MWSS share: C points on the full circle in theta."""
@@ -84,20 +96,10 @@ class _Equiangular(Sampling):
         self._project(circles)
         fold_circles(circles, even, odd, parities, self._offset, columns)
 
-    def _pairs(self, n_m: int) -> tuple[Array, Array]:
-        """Return places of even m and of odd m, in two arrays of one length, -1 for none."""
-        m = np.arange(n_m)
-        if n_m == self.n_phi:
-            m = np.where(m < self.bandlimit, m, m - n_m)
-        even, odd = np.flatnonzero(m % 2 == 0), np.flatnonzero(m % 2 != 0)
-        pairs = np.full((2, max(even.size, odd.size)), -1)
-        pairs[0, : even.size], pairs[1, : odd.size] = even, odd
-        return pairs[0], pairs[1]
-
     def weigh_columns(
         self, columns: Array, orders: tuple[int, ...], *, mixing: Array, threads: int
     ) -> None:
-        even, odd = self._pairs(columns.shape[1])
+        even, odd = _pairs(self.bandlimit, self.n_phi, columns.shape[1])
         parities = np.where(np.array(orders) % 2 == 0, 1.0, -1.0)
         step = max(1, _BATCH_SIZE // (self.n_phi * len(orders)))
         tasks = [
