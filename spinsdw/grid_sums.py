@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from spinsdw.fourier import fill_maps, fill_maps_columns
-from spinsdw.parallel import run_tasks
+from spinsdw.parallel import run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
 
@@ -70,12 +70,16 @@ class GridSums:
     workspace: Array | None = None
 
     @property
+    def _threads(self) -> int:
+        return threads_for(self.sampling.bandlimit, self.threads)
+
+    @property
     def _n_m(self) -> int:
         n_phi = self.sampling.n_phi
         return n_phi // 2 + 1 if self.real else n_phi
 
     def _order_sums(self, weights: Array, lowest: int) -> OrderSums:
-        return OrderSums(self.orders, weights, lowest, 1 if self.real else 2, self.threads)
+        return OrderSums(self.orders, weights, lowest, 1 if self.real else 2, self._threads)
 
     @property
     def workspace_size(self) -> int:
@@ -109,7 +113,7 @@ class GridSums:
             functools.partial(call, first, min(first + step, size))
             for first in range(0, size, step)
         ]
-        run_tasks(tasks, self.threads)
+        run_tasks(tasks, self._threads)
 
     def _share_rings(self, call: Callable[[int, int], None], outputs: int) -> None:
         step = max(_FEWEST_RINGS, _TASK_BYTES // (16 * self.sampling.n_phi * outputs))
@@ -140,7 +144,9 @@ class GridSums:
         if quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
             engine.fill_columns(flm, sums, identity, columns)
-            self.sampling.weigh_columns(columns, self.orders, mixing=identity, threads=self.threads)
+            self.sampling.weigh_columns(
+                columns, self.orders, mixing=identity, threads=self._threads
+            )
             self._mix(self.mixing, columns)
         else:
             engine.fill_columns(flm, sums, self.mixing, columns)
@@ -169,7 +175,9 @@ class GridSums:
         )
         unmixing = np.ascontiguousarray(self.mixing.conj().T)
         if quadrature:
-            self.sampling.weigh_columns(columns, self.orders, mixing=unmixing, threads=self.threads)
+            self.sampling.weigh_columns(
+                columns, self.orders, mixing=unmixing, threads=self._threads
+            )
         elif not np.array_equal(unmixing, [[1.0]]):
             self._mix(unmixing, columns)
         _engine(self.sampling).add_to_harmonics(columns, self._order_sums(weights, lowest), out)

@@ -14,7 +14,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 from spinsdw.errors import ParameterError
 
-__all__ = ["resolve_threads", "run_tasks"]
+__all__ = ["resolve_threads", "run_tasks", "threads_for"]
+
+# Below this bandlimit handing work to a second thread takes longer than doing it.
+_LEAST_BANDLIMIT = 200
 
 
 def resolve_threads(threads: int | None) -> int:
@@ -37,6 +40,17 @@ def resolve_threads(threads: int | None) -> int:
         msg = f"threads={threads!r} must be a positive integer, or None for all cores."
         raise ParameterError(msg)
     return count
+
+
+def threads_for(bandlimit: int, threads: int) -> int:
+    """Return how many of the threads to use for one transform: one for a small one.
+
+    Examples
+    --------
+    >>> threads_for(64, 4), threads_for(512, 4)
+    (1, 4)
+    """
+    return threads if bandlimit >= _LEAST_BANDLIMIT else 1
 
 
 @functools.cache

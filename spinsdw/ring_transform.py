@@ -13,7 +13,7 @@ from spinsdw.errors import ParameterError
 from spinsdw.fourier import from_series, to_series
 from spinsdw.grid_sums import fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm
-from spinsdw.parallel import resolve_threads, run_tasks
+from spinsdw.parallel import resolve_threads, run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.signals import check_flag, check_map, check_spin, writable
@@ -150,6 +150,10 @@ class HealpixTransform:
         """Shape of one map: (pixels,)."""
         return (self.rings.n_pixels,)
 
+    @property
+    def _threads(self) -> int:
+        return threads_for(self.bandlimit, resolve_threads(self.threads))
+
     @functools.cached_property
     def _weights(self) -> Array:
         el = np.arange(self.bandlimit)
@@ -160,7 +164,7 @@ class HealpixTransform:
     @property
     def _sums(self) -> OrderSums:
         sides = 1 if self.real else 2
-        return OrderSums((-self.spin,), self._weights, 0, sides, resolve_threads(self.threads))
+        return OrderSums((-self.spin,), self._weights, 0, sides, self._threads)
 
     def _columns(self) -> Array:
         n_m = self.bandlimit if self.real else 2 * self.bandlimit - 1
@@ -176,7 +180,7 @@ class HealpixTransform:
         # The long rings first, so that threads finish together.
         blocks.sort(key=lambda block: -int(block.sizes.sum()))
         tasks = [functools.partial(call, block) for block in blocks]
-        run_tasks(tasks, resolve_threads(self.threads))
+        run_tasks(tasks, self._threads)
 
     def _to_map(self, flm: Array) -> Array:
         columns = self._columns()
