@@ -9,7 +9,14 @@ import numpy as np
 
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.harmonics import check_bandlimit, resize
-from spinsdw.healpix import HealpixFit, default_bandlimit, flm_to_map, map_to_flm, nside_of
+from spinsdw.healpix import (
+    HealpixFit,
+    default_bandlimit,
+    flm_to_map,
+    map_to_flm,
+    nside_of,
+    pixel_directions,
+)
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.sampling import MW, MWSS, Sampling
 from spinsdw.spin_transform import SpinHarmonicTransform
@@ -37,6 +44,11 @@ class Sky(Protocol):
         """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
         ...
 
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Colatitudes and longitudes of the points in radians, of the shape of a map."""
+        ...
+
     def scalar_map(self, flm: Array) -> Array:
         """Return the complex map of spin-0 coefficients of any bandlimit."""
         ...
@@ -59,6 +71,11 @@ class HealpixSky:
     def sampling_name(self) -> str:
         """Kind of grid the wavelet coefficients of this sky live on."""
         return "mw"
+
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Colatitudes and longitudes of the points in radians, of the shape of a map."""
+        return pixel_directions(self.nside)
 
     def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
         """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
@@ -91,6 +108,13 @@ class GridSky:
     def sampling_name(self) -> str:
         """Kind of grid the wavelet coefficients of this sky live on."""
         return self.sampling.name
+
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Colatitudes and longitudes of the points in radians, of the shape of a map."""
+        grid = self.sampling
+        colatitudes, longitudes = np.meshgrid(grid.colatitudes, grid.longitudes, indexing="ij")
+        return colatitudes, longitudes
 
     def _transform(self, spin: int, *, real: bool = False) -> SpinHarmonicTransform:
         return SpinHarmonicTransform(
@@ -130,13 +154,24 @@ def position_map(
     Returns
     -------
     ndarray, float64
-        Weights in [0, 1], interpolated by the scale's own harmonics.
+        Weights in [0, 1], interpolated linearly in both angles: harmonics would ring where the
+        weights fall steeply.
     """
     grid = transform.grid_of(transform.bandlimits[scale])
-    flm = SpinHarmonicTransform(
-        grid.bandlimit, sampling=grid, real=True, threads=transform.threads
-    ).analysis(values)
-    return np.clip(sky.scalar_map(flm).real, 0.0, 1.0)
+    colatitudes, longitudes = sky.points
+    rings = grid.colatitudes
+    last = grid.n_rings - 1
+    step = rings[1] - rings[0] if last > 0 else np.pi
+    ring = np.clip((colatitudes - rings[0]) / step, 0, last)
+    above = np.minimum(ring.astype(np.int64), max(last - 1, 0))
+    below = np.minimum(above + 1, last)
+    place = longitudes * (grid.n_phi / (2 * np.pi))
+    west = place.astype(np.int64)
+    across, down = place - west, ring - above
+    west, east = west % grid.n_phi, (west + 1) % grid.n_phi
+    north = (1 - across) * values[above, west] + across * values[above, east]
+    south = (1 - across) * values[below, west] + across * values[below, east]
+    return np.asarray((1 - down) * north + down * south)
 
 
 def sky_of(
