@@ -277,14 +277,12 @@ class SpinWaveletTransform:
         psi = self.wavelets.wavelet_harmonics(scale)
         weights = np.zeros((len(kept), grid.bandlimit), dtype=np.complex128)
         weights[:, : psi.shape[1]] = psi[kept].conj()
-        mixing = np.exp(
-            1j * np.outer(directionality.orientations, [orders[i] for i in kept])
-        ).astype(np.complex128)
+        mixing = np.ascontiguousarray(directionality.orders_to_orientations[:, kept])
         lowest = max(self._tiling.scale_lowest_degree(scale), abs(self.spin))
         sums = GridSums(
             grid,
             tuple(orders[i] for i in kept),
-            np.ascontiguousarray(mixing),
+            mixing,
             self.real,
             resolve_threads(self.threads),
         )

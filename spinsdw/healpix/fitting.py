@@ -204,7 +204,7 @@ def map_to_flm(  # noqa: PLR0913 - the map, what to fit, and the few choices of 
     ConvergenceWarning
         If max_iterations is reached before the tolerance.
     PrecisionWarning
-        If the bandlimit is above ``2.5 nside``.
+        If the bandlimit is above ``2.5 nside + 1``.
 
     Examples
     --------
