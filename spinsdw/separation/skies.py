@@ -57,6 +57,22 @@ class Sky(Protocol):
         """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
         ...
 
+    def polarisation_map(self, plm: Array) -> Array:
+        """Return P = Q + iU of spin-2 coefficients."""
+        ...
+
+    def adjoint_polarisation_map(self, p: Array) -> Array:
+        """Apply the adjoint of `polarisation_map`: sums over samples."""
+        ...
+
+    def coordinates(self, p: Array) -> Array:
+        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
+        ...
+
+    def adjoint_coordinates(self, values: Array) -> Array:
+        """Apply the adjoint of `coordinates`."""
+        ...
+
 
 @dataclass(frozen=True)
 class HealpixSky:
@@ -90,6 +106,26 @@ class HealpixSky:
         # A sum over pixel centres: no fit, so that a share computed from it stays non-negative.
         transform = HealpixTransform(self.nside, bandlimit, real=True, threads=self.threads)
         return transform.adjoint_synthesis(weights) * (4 * np.pi / weights.size)
+
+    @property
+    def _transform(self) -> HealpixTransform:
+        return HealpixTransform(self.nside, self.bandlimit, 2, threads=self.threads)
+
+    def polarisation_map(self, plm: Array) -> Array:
+        """Return P = Q + iU of spin-2 coefficients."""
+        return self._transform.synthesis(plm)
+
+    def adjoint_polarisation_map(self, p: Array) -> Array:
+        """Apply the adjoint of `polarisation_map`: sums over samples."""
+        return self._transform.adjoint_synthesis(p)
+
+    def coordinates(self, p: Array) -> Array:
+        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
+        return p * np.sqrt(4 * np.pi / p.shape[-1])
+
+    def adjoint_coordinates(self, values: Array) -> Array:
+        """Apply the adjoint of `coordinates`."""
+        return self.coordinates(values)
 
 
 @dataclass(frozen=True)
@@ -133,6 +169,23 @@ class GridSky:
         """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
         # Between its samples a mask on this grid is the band-limited function they define.
         return resize(self._transform(0, real=True).analysis(weights), bandlimit)
+
+    def polarisation_map(self, plm: Array) -> Array:
+        """Return P = Q + iU of spin-2 coefficients."""
+        return self._transform(2).synthesis(plm)
+
+    def adjoint_polarisation_map(self, p: Array) -> Array:
+        """Apply the adjoint of `polarisation_map`: sums over samples."""
+        return self._transform(2).adjoint_synthesis(p)
+
+    def coordinates(self, p: Array) -> Array:
+        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
+        # Those of the band-limited function the samples define: the grid's only exact integral.
+        return self._transform(2).analysis(p)
+
+    def adjoint_coordinates(self, values: Array) -> Array:
+        """Apply the adjoint of `coordinates`."""
+        return self._transform(2).adjoint_analysis(values)
 
 
 def position_map(

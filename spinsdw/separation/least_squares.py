@@ -1,0 +1,318 @@
+r"""Fit full-sky E and B to polarisation observed behind a mask, by regularised least squares.
+
+For weights W and noise power n^2 the fit is the minimum over E and B of
+
+.. math:: \int W \, |P - {}_2Y p|^2 \, d\Omega \, / \, n^2
+          + \sum_{lm} |E_{lm}|^2 / C^E_l + \sum_{lm} |B_{lm}|^2 / C^B_l , \quad p = -(E + iB).
+
+With C the covariance of E and B it is their Wiener filter; with C^B = 0 it explains by E whatever
+E can explain.  All is done with p, whose real inner product Re <p, p'> is that of the real degrees
+of freedom of E and B: p is split by :math:`\bar p_{lm} = (-1)^m p^*_{l,-m}`, E = -(p + p-bar)/2.
+
+In x = C^{-1/2} p the normal equations are (1 + S Y^H W Y S / n^2) x = S Y^H W P / n^2 with
+S = C^{1/2}; they are solved by preconditioned conjugate gradients that carry the residual in the
+map (CGLS), so that the condition number enters once instead of squared.  The preconditioner is the
+inverse for uniform weights, 1 / (1 + C <W> / n^2).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.harmonics import check_integer, conjugate_field
+from spinsdw.separation.skies import Sky
+
+__all__ = ["Convergence", "EBPrior", "LeastSquares", "Observation"]
+
+Array = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """How a fit by conjugate gradients went.
+
+    Attributes
+    ----------
+    iterations : int
+        Steps taken.
+    residuals : ndarray, shape (iterations + 1,), float64
+        Norm of the preconditioned gradient after each step, relative to its start.
+    objective : ndarray, shape (iterations + 1,), float64
+        The sum that is minimised, after each step; it never rises.
+    converged : bool
+        Whether the last residual is at most the tolerance.
+    """
+
+    iterations: int
+    residuals: Array = field(repr=False)
+    objective: Array = field(repr=False)
+    converged: bool
+
+    @property
+    def residual(self) -> float:
+        """The last residual."""
+        return float(self.residuals[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class _SplitFilter:
+    """Multiply E and B by real factors of degree, acting on p = -(E + iB)."""
+
+    e_factors: Array
+    b_factors: Array
+
+    @functools.cached_property
+    def _terms(self) -> tuple[Array, Array | None]:
+        counts = 2 * np.arange(self.e_factors.size) + 1
+        own = np.repeat((self.e_factors + self.b_factors) / 2, counts)
+        mirrored = np.repeat((self.e_factors - self.b_factors) / 2, counts)
+        return own, mirrored if mirrored.any() else None
+
+    def __call__(self, plm: Array) -> Array:
+        own, mirrored = self._terms
+        result: Array = own * plm
+        if mirrored is not None:
+            result += mirrored * conjugate_field(plm)
+        return result
+
+
+def _check_spectrum(values: object, name: str) -> Array:
+    """Return a prior spectrum, zero at degrees 0 and 1, after checking it."""
+    spectrum = np.array(values, dtype=np.float64)
+    if spectrum.ndim != 1 or spectrum.size < 3:
+        msg = f"{name} has shape {spectrum.shape}; it must hold C_l from l = 0 to 2 at least."
+        raise ShapeError(msg)
+    bad = np.count_nonzero(~(np.isfinite(spectrum) & (spectrum >= 0)))
+    if bad:
+        msg = f"{name} holds {bad} values that are negative or not finite; a variance is neither."
+        raise DataError(msg)
+    spectrum[:2] = 0.0
+    spectrum.setflags(write=False)
+    return spectrum
+
+
+@dataclass(frozen=True, eq=False)
+class EBPrior:
+    """Prior variances C_l of E and B.
+
+    Parameters
+    ----------
+    e_spectrum, b_spectrum : array_like, shape (bandlimit,)
+        C_l from l = 0 on, the square of the map's unit; degrees 0 and 1 are not used. Where C_l is
+        zero the fit is zero: ``b_spectrum=numpy.zeros(bandlimit)`` fits E alone.
+
+    Raises
+    ------
+    ShapeError
+        If a spectrum is not one-dimensional, or their lengths differ.
+    DataError
+        If a value is negative or not finite.
+    """
+
+    e_spectrum: Array
+    b_spectrum: Array
+
+    def __post_init__(self) -> None:
+        for name in ("e_spectrum", "b_spectrum"):
+            object.__setattr__(self, name, _check_spectrum(getattr(self, name), name))
+        if self.e_spectrum.size != self.b_spectrum.size:
+            msg = (
+                f"e_spectrum has {self.e_spectrum.size} degrees and b_spectrum "
+                f"{self.b_spectrum.size}, and they must agree; cut the longer one."
+            )
+            raise ShapeError(msg)
+
+    @property
+    def bandlimit(self) -> int:
+        """L: degrees are l < L."""
+        return int(self.e_spectrum.size)
+
+    @functools.cached_property
+    def root(self) -> _SplitFilter:
+        """S = C^(1/2) as an operator on p."""
+        return _SplitFilter(np.sqrt(self.e_spectrum), np.sqrt(self.b_spectrum))
+
+    def preconditioner(self, precision: float) -> _SplitFilter:
+        """Return 1 / (1 + C precision) as an operator on p."""
+        return _SplitFilter(
+            1 / (1 + precision * self.e_spectrum), 1 / (1 + precision * self.b_spectrum)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What an instrument sees of a sky, in units of its noise: the operator W^(1/2) Y / n.
+
+    Parameters
+    ----------
+    sky : Sky
+        The pixelisation.
+    weights : ndarray, shape of a map, float64
+        W: a mask, or an inverse-noise map relative to 1 / noise_level^2; not negative.
+    noise_level : float
+        n: the noise of Q and of U where W is 1, in the map's unit times radians. With
+        ``noise_level=1`` the weights are inverse noise powers themselves.
+
+    Raises
+    ------
+    ParameterError
+        If the noise level is not positive.
+    DataError
+        If a weight is negative or not finite, or all are zero.
+    """
+
+    sky: Sky
+    weights: Array
+    noise_level: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.noise_level) and self.noise_level > 0):
+            msg = (
+                f"noise_level={self.noise_level} must be positive and finite; a noise-free map is "
+                "fitted with a level far below its signal's."
+            )
+            raise ParameterError(msg)
+        bad = np.count_nonzero(~(np.isfinite(self.weights) & (self.weights >= 0)))
+        if bad or not np.any(self.weights):
+            found = f"{bad} values that are negative or not finite" if bad else "only zeros"
+            msg = f"weights hold {found}; they must be at least 0 and observe some of the sky."
+            raise DataError(msg)
+
+    @functools.cached_property
+    def _root(self) -> Array:
+        return np.sqrt(self.weights) / self.noise_level
+
+    @functools.cached_property
+    def precision(self) -> float:
+        """Mean over the sphere of the inverse noise power, <W> / n^2."""
+        mean = float(self.sky.integrals(self.weights, 1)[0].real / math.sqrt(4 * math.pi))
+        return mean / self.noise_level**2
+
+    def whiten(self, p: Array) -> Array:
+        """Return a map in units of the noise; the sum of squares is its integral."""
+        return self.sky.coordinates(self._root * p)
+
+    def observe(self, plm: Array) -> Array:
+        """Return what is seen of coefficients, in units of the noise."""
+        return self.whiten(self.sky.polarisation_map(plm))
+
+    def adjoint_observe(self, values: Array) -> Array:
+        """Apply the adjoint of `observe`."""
+        weighted = self._root * self.sky.adjoint_coordinates(values)
+        return self.sky.adjoint_polarisation_map(weighted)
+
+
+def _real_dot(left: Array, right: Array) -> float:
+    """Re <left, right>, the inner product of the real degrees of freedom."""
+    return float(np.vdot(left, right).real)
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """Fit E and B to an observation by preconditioned conjugate gradients.
+
+    Parameters
+    ----------
+    observation : Observation
+        Where the map was observed and how well.
+    prior : EBPrior
+        Variances of E and B, of the sky's bandlimit.
+    max_iterations : int, default 25
+        The most steps to take; each costs one synthesis and its adjoint.
+    tolerance : float, default 1e-6
+        The fit stops when the preconditioned gradient has fallen by this factor; 0 never stops it.
+
+    Raises
+    ------
+    ParameterError
+        If max_iterations or tolerance is out of range, or the bandlimits differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from spinsdw.sampling import MW
+    >>> from spinsdw.separation.skies import GridSky
+    >>> sky, flat = GridSky(MW(8)), np.ones(8)
+    >>> observation = Observation(sky, np.ones((8, 15)), 1e-6)
+    >>> p = sky.polarisation_map(np.arange(64.0))
+    >>> plm, convergence = LeastSquares(observation, EBPrior(flat, flat)).solve(p)
+    >>> bool(np.allclose(plm[4:], np.arange(64.0)[4:])), convergence.converged
+    (True, True)
+    """
+
+    observation: Observation
+    prior: EBPrior
+    max_iterations: int = 25
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        remedy = "25 suit an E-projection"
+        check_integer(self.max_iterations, "max_iterations", minimum=1, remedy=remedy)
+        if not 0 <= self.tolerance < 1:
+            msg = f"tolerance={self.tolerance} must be in [0, 1); 1e-6 is the default."
+            raise ParameterError(msg)
+        if self.prior.bandlimit != self.observation.sky.bandlimit:
+            msg = (
+                f"prior has bandlimit={self.prior.bandlimit} and the sky "
+                f"{self.observation.sky.bandlimit}, and they must agree; cut or extend the spectra."
+            )
+            raise ParameterError(msg)
+
+    @functools.cached_property
+    def _preconditioner(self) -> _SplitFilter:
+        return self.prior.preconditioner(self.observation.precision)
+
+    def solve(self, p: Array) -> tuple[Array, Convergence]:
+        """Return the coefficients p_lm that fit a map best, and how the fit went.
+
+        Parameters
+        ----------
+        p : ndarray, shape of a map, complex128
+            P = Q + iU; finite where the weights are not 0, and zero or finite elsewhere.
+
+        Returns
+        -------
+        plm : ndarray, shape (bandlimit**2,), complex128
+            -(E_lm + i B_lm); `spinsdw.harmonics.spin_to_eb` splits it.
+        convergence : Convergence
+            Steps, residuals and the sum minimised.
+        """
+        return self.solve_whitened(self.observation.whiten(p))
+
+    def solve_whitened(self, values: Array) -> tuple[Array, Convergence]:
+        """Fit values in units of the noise, as `Observation.whiten` makes them."""
+        root, observation = self.prior.root, self.observation
+        remainder = values.astype(np.complex128)
+        gradient = root(observation.adjoint_observe(remainder))
+        direction = self._preconditioner(gradient)
+        x = np.zeros_like(direction)
+        power = start = _real_dot(gradient, direction)
+        powers, objective = [start], [_real_dot(remainder, remainder)]
+        while len(powers) <= self.max_iterations and power > self.tolerance**2 * start:
+            change = observation.observe(root(direction))
+            step = power / (_real_dot(change, change) + _real_dot(direction, direction))
+            x += step * direction
+            remainder -= step * change
+            gradient = root(observation.adjoint_observe(remainder)) - x
+            ahead = self._preconditioner(gradient)
+            previous, power = power, _real_dot(gradient, ahead)
+            direction *= power / previous
+            direction += ahead
+            powers.append(power)
+            objective.append(_real_dot(remainder, remainder) + _real_dot(x, x))
+        # A map of zeros is fitted by zeros, without a step.
+        residuals = np.sqrt(np.array(powers) / (start if start > 0 else 1.0))
+        converged = bool(power <= self.tolerance**2 * start)
+        history = Convergence(len(powers) - 1, residuals, np.array(objective), converged)
+        return root(x), history
+
+    def solve_all(self, maps: Array) -> tuple[Array, tuple[Convergence, ...]]:
+        """Fit every map of a stack, shape (batch, map); coefficients and one report for each."""
+        fits = [self.solve(p) for p in maps]
+        return np.array([plm for plm, _ in fits]), tuple(history for _, history in fits)
