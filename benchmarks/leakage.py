@@ -28,6 +28,7 @@ from spinsdw.harmonics import multiply_by_degree
 from spinsdw.healpix import alm_to_flm, flm_to_map
 from spinsdw.maps_io import read_mask
 from spinsdw.masks import distance_to_edge, galactic_cut, upgrade
+from spinsdw.separation import Pseudo
 from spinsdw.simulation import simulate_eb, simulate_qu
 
 BEAM = np.radians(2)
@@ -62,7 +63,7 @@ def masked_map2alm(mask: np.ndarray) -> Method:
 
 def pseudo(mask: np.ndarray, directions: int, taper: float) -> Method:
     separator = EBSeparator(
-        mask=mask, directions=directions, taper=taper, lowest_scale=LOWEST_SCALE
+        mask=mask, directions=directions, method=Pseudo(taper), lowest_scale=LOWEST_SCALE
     )
 
     def bands(q: np.ndarray, u: np.ndarray) -> Bands:

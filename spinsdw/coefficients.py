@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 import operator
 from collections.abc import Callable, Iterator, Mapping
@@ -163,6 +164,38 @@ class WaveletCoefficients:
     def copy(self) -> WaveletCoefficients:
         """Return coefficients with arrays of their own."""
         return self._with(lambda _, values: values.copy())
+
+    def reshape_batch(self, shape: tuple[int, ...]) -> WaveletCoefficients:
+        """Return the same numbers with other leading axes.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            The batch wanted, of as many signals as now; ``()`` for one signal.
+
+        Returns
+        -------
+        WaveletCoefficients
+            Views of the arrays where numpy can give them.
+
+        Raises
+        ------
+        ShapeError
+            If the number of signals differs.
+        """
+        batch = self._scaling.shape[:-2]
+        if math.prod(batch) != math.prod(shape):
+            msg = (
+                f"shape={shape} holds {math.prod(shape)} signals, but the batch {batch} has "
+                f"{math.prod(batch)}; keep their number."
+            )
+            raise ShapeError(msg)
+
+        def reshape(key: int | str, values: Array) -> Array:
+            own = values.shape[-2:] if key == "scaling" else values.shape[-3:]
+            return values.reshape(*shape, *own)
+
+        return self._with(reshape)
 
     def map(self, function: Callable[[Array], Array]) -> WaveletCoefficients:
         """Apply a function of arrays to the scaling part and to every scale.

@@ -10,19 +10,22 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
-from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.harmonics import check_bandlimit, multiply_by_degree, polarisation_factor
-from spinsdw.healpix import (
-    HealpixFit,
-    check_mask,
-    check_nside,
-    clean_polarisation,
-    nested_to_ring,
-    ring_to_nested,
+from spinsdw.healpix import HealpixFit, check_nside, nested_to_ring, ring_to_nested
+from spinsdw.separation.inputs import (
+    check_beam,
+    check_inverse_noise,
+    combine_masks,
+    observed_stack,
+    sky_of_stack,
 )
-from spinsdw.separation.pseudo import PseudoMethod
+from spinsdw.separation.least_squares import Convergence
+from spinsdw.separation.method import Estimator, Method
+from spinsdw.separation.registry import resolve_method
 from spinsdw.separation.report import Clock, check_choice
 from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
+from spinsdw.separation.survey import Survey
 from spinsdw.signals import check_flag, refuse_masked
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -30,11 +33,9 @@ from spinsdw.wavelet_transform import SpinWaveletTransform
 __all__ = ["EBMaps", "EBSeparator", "SeparationInfo"]
 
 Array = np.ndarray[Any, Any]
+AnySky = HealpixSky | GridSky
 Output = Literal["fields", "derivatives", "potentials"]
 
-# Every method is one file of spinsdw.separation; it turns the wavelet coefficients of the masked
-# map into those that are synthesised, and says how far each was kept.
-_METHODS = {"pseudo": PseudoMethod}
 _DEFAULT_LOWEST_SCALE = 2
 
 
@@ -45,7 +46,9 @@ class SeparationInfo:
     Attributes
     ----------
     method : str
-        Name of the estimator.
+        Name of the method.
+    choices : str
+        The method with its free choices.
     bandlimit : int
         Degrees used are below it.
     scales : tuple of int
@@ -55,17 +58,22 @@ class SeparationInfo:
     kept_fraction : dict
         Mean weight over the sphere of the coefficients of each scale, and of the scaling part.
     fit : HealpixFit or None
-        How well harmonic coefficients fit a HEALPix map; None on grids, where they are exact.
+        How well harmonic coefficients fit a HEALPix map, of the worst map of a stack; None where
+        no such fit was made, as on grids, where coefficients are exact.
+    convergence : tuple of Convergence
+        How the regularised fit of each map went; empty where there was none.
     seconds : dict of str to float
         Wall time of each step.
     """
 
     method: str
+    choices: str
     bandlimit: int
     scales: tuple[int, ...]
     sky_fraction: float
     kept_fraction: Mapping[int | str, float]
     fit: HealpixFit | None
+    convergence: tuple[Convergence, ...]
     seconds: Mapping[str, float]
 
 
@@ -75,13 +83,13 @@ class EBMaps:
 
     Attributes
     ----------
-    E, B : ndarray, float64
+    E, B : ndarray, shape of Q and U, float64
         The maps, pixelised as Q and U, in their unit (for ``output="fields"``).
-    weight : ndarray, float64
+    weight : ndarray, shape of one map, float64
         Where to trust the maps, from 0 to 1: the weights of all scales, each counted with the
         power its weighted coefficients have left. A scale dropped everywhere does not count.
-    weights : mapping of int to ndarray
-        The same for every scale.
+    weights : mapping of int to ndarray, shape of one map
+        The retained sky of every scale: the mean of its weights over orientations.
     coefficients : WaveletCoefficients
         The weighted spin-2 wavelet coefficients: -Re is E, -Im is B.
     info : SeparationInfo
@@ -97,6 +105,46 @@ class EBMaps:
 
 
 @dataclass(frozen=True, eq=False)
+class _Prepared:
+    """A method prepared for a survey, and what of its weights is shown to users."""
+
+    survey: Survey
+    estimator: Estimator
+
+    @functools.cached_property
+    def kept_fraction(self) -> dict[int | str, float]:
+        """Mean of the weights over the sphere and the orientations, for each scale."""
+        if self.survey.mask is None:
+            return dict.fromkeys(self.estimator.weights, 1.0)
+        return {
+            key: self.survey.sphere_mean(values.reshape(-1, *values.shape[-2:]).mean(axis=0))
+            for key, values in self.estimator.weights.items()
+        }
+
+    @functools.cached_property
+    def weight_maps(self) -> dict[int, Array]:
+        """Mean of the weights over orientations at the points of the maps, for each scale."""
+        survey = self.survey
+        maps = {}
+        for j in survey.transform.scales:
+            means = self.estimator.weights[j].mean(axis=0)
+            maps[j] = position_map(means, survey.transform, j, survey.sky) * survey.observed
+            maps[j].setflags(write=False)
+        return maps
+
+    def weight_map(self, coefficients: WaveletCoefficients) -> Array:
+        """Weigh `weight_maps` by the power that is left in each scale, over a stack of maps."""
+        weight, total = np.zeros(self.survey.map_shape), 0.0
+        for j, values in self.weight_maps.items():
+            squares = np.abs(coefficients[j]) ** 2
+            power = self.survey.sphere_mean(squares.mean(axis=tuple(range(squares.ndim - 2))))
+            weight += power * values
+            total += power
+        # A map without any power is trusted where its mask is.
+        return weight / total if total > 0 else np.mean(list(self.weight_maps.values()), axis=0)
+
+
+@dataclass(frozen=True, eq=False)
 class EBSeparator:
     """Separate Q and U into E and B with spin wavelets.
 
@@ -105,30 +153,35 @@ class EBSeparator:
     bandlimit : int or None, optional
         L: degrees are l < L. None takes it from the mask: 2 nside + 1 on HEALPix, the grid's own
         on MW and MWSS.
-    mask : ndarray, optional
-        1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). None: full sky.
-    method : str, default "pseudo"
-        The estimator; "pseudo" weighs wavelet coefficients by the share of their energy in holes.
+    mask : ndarray, or sequence of ndarray, optional
+        1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). Several masks are
+        multiplied. None: full sky.
+    method : str or object, default "pseudo"
+        The estimator: a name, or an object of `spinsdw.separation` that holds its free choices.
     directions : int, default 1
         N of the wavelets.
     dilation : float, default 2.0
         Ratio of neighbouring scales.
     lowest_scale : int, default 2, or the highest scale if that is lower
         Structures larger than scale J0 belong to the scaling part.
-    taper : float, default 0.2
-        Share of its energy in the hole, in (0, 1], at which a coefficient is dropped.
+    inverse_noise : ndarray, optional
+        Inverse noise variance of Q and of U at each pixel, pixelised as the mask, in any unit: how
+        methods that fit weigh the pixels. None: uniform.
+    beam : float or ndarray, optional
+        Beam of the maps: full width at half maximum in radians of a Gaussian, or the window
+        function b_l from l = 0 on. Results keep the beam; methods with priors need to know it.
     output : {"fields", "derivatives", "potentials"}, default "fields"
         E and B; or N_l E_lm and N_l B_lm, second derivatives of Q and U; or E_lm / N_l and
         B_lm / N_l; N_l = sqrt((l+2)! / (l-2)!).
     nest : bool, default False
-        Whether HEALPix maps and mask are in nested order.
+        Whether HEALPix maps, mask and inverse noise are in nested order.
     threads : int, optional
         Threads to use; all cores when None.
 
     Notes
     -----
     Q and U are in the COSMO frame (HEALPix's own). What depends on the mask only is computed at the
-    first separation and kept.
+    first separation, or by `prepare`, and kept.
 
     Examples
     --------
@@ -144,11 +197,12 @@ class EBSeparator:
 
     bandlimit: int | None = None
     mask: Array | None = None
-    method: str = "pseudo"
+    method: str | Method = "pseudo"
     directions: int = 1
     dilation: float = 2.0
     lowest_scale: int = 2
-    taper: float = 0.2
+    inverse_noise: Array | None = None
+    beam: Array | float | None = None
     output: Output = "fields"
     nest: bool = False
     threads: int | None = None
@@ -158,11 +212,12 @@ class EBSeparator:
         bandlimit: int | None = None,
         mask: Array | None = None,
         *,
-        method: str = "pseudo",
+        method: str | Method = "pseudo",
         directions: int = 1,
         dilation: float = 2.0,
         lowest_scale: int | None = None,
-        taper: float = 0.2,
+        inverse_noise: Array | None = None,
+        beam: Array | float | None = None,
         output: Output = "fields",
         nest: bool = False,
         threads: int | None = None,
@@ -170,33 +225,29 @@ class EBSeparator:
         if bandlimit is None and mask is None:
             msg = "bandlimit=None needs a mask to take the resolution from; give one of the two."
             raise ParameterError(msg)
-        check_choice("method", method, tuple(_METHODS))
+        chosen = resolve_method(method)
         check_choice("output", output, get_args(Output))
-        if not isinstance(taper, int | float | np.number) or not 0 < taper <= 1:
-            msg = f"taper={taper!r} must be a share of energy in (0, 1]; 0.2 suits most masks."
-            raise ParameterError(msg)
         weights = None
         if mask is not None:
-            refuse_masked(mask, "mask")
-            values = np.asarray(mask)
-            sky = sky_of(values, bandlimit, name="mask", threads=threads)
-            weights = check_mask(values, values.shape)
-            weights.setflags(write=False)
+            weights = combine_masks(mask)
+            sky = sky_of(weights, bandlimit, name="mask", threads=threads)
             bandlimit = sky.bandlimit
             if nest and isinstance(sky, HealpixSky):
                 check_nside(sky.nside, nested=True)
         bandlimit = check_bandlimit(bandlimit)
+        noise = None
+        if inverse_noise is not None:
+            noise = check_inverse_noise(inverse_noise, None if weights is None else weights.shape)
         if lowest_scale is None:
-            lowest_scale = min(
-                _DEFAULT_LOWEST_SCALE,
-                ScaleDiscretisedTiling(bandlimit, dilation=dilation).highest_scale,
-            )
-        settings = (bandlimit, weights, method, directions, dilation, lowest_scale)
-        parameters = (*settings, float(taper), output, check_flag(nest, "nest"), threads)
+            highest = ScaleDiscretisedTiling(bandlimit, dilation=dilation).highest_scale
+            lowest_scale = min(_DEFAULT_LOWEST_SCALE, highest)
+        settings = (bandlimit, weights, chosen, directions, dilation, lowest_scale, noise)
+        window = check_beam(beam, bandlimit)
+        parameters = (*settings, window, output, check_flag(nest, "nest"), threads)
         for item, value in zip(fields(self), parameters, strict=True):
             object.__setattr__(self, item.name, value)
         # What each sky costs to prepare, kept with the separator.
-        object.__setattr__(self, "_methods", {})
+        object.__setattr__(self, "_estimators", {})
         # Checks directions, dilation, lowest_scale and threads now rather than at the first map.
         self._transform("mw")
 
@@ -216,42 +267,32 @@ class EBSeparator:
         """The mask in ring order, as everything inside works."""
         return None if self.mask is None else self._in_rings(self.mask)
 
-    def _prepared(self, sky: HealpixSky | GridSky) -> PseudoMethod:
-        methods: dict[HealpixSky | GridSky, PseudoMethod] = self._methods  # type: ignore[attr-defined]
-        if sky not in methods:
-            transform = self._transform(sky.sampling_name)
-            methods[sky] = _METHODS[self.method](transform, sky, self._ring_mask, self.taper)
-        return methods[sky]
-
-    def _sky_of(self, q: Array) -> HealpixSky | GridSky:
-        if self.mask is not None and q.shape != self.mask.shape:
-            msg = f"q has shape {q.shape} but the mask {self.mask.shape}; they must be alike."
-            raise ShapeError(msg)
-        return sky_of(q, self.bandlimit, name="q", threads=self.threads)
-
-    def _observed(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """Return Q and U in ring order, zero and finite where masked."""
-        q, u = self._in_rings(q), self._in_rings(u)
-        cleaned_q, cleaned_u, found = clean_polarisation(q, u, self._ring_mask)
-        given = np.ones(q.shape) if self._ring_mask is None else self._ring_mask
-        lost = np.count_nonzero((found == 0) & (given > 0))
-        if lost:
-            msg = (
-                f"q and u are not observed at {lost} pixels where the mask is not 0; set the mask "
-                "to 0 there and make a separator with it."
+    def _prepared(self, sky: AnySky) -> _Prepared:
+        held: dict[AnySky, _Prepared] = self._estimators  # type: ignore[attr-defined]
+        if sky not in held:
+            noise = self.inverse_noise
+            if noise is not None and noise.shape != sky.map_shape:
+                msg = f"inverse_noise has shape {noise.shape} but the maps {sky.map_shape}."
+                raise ShapeError(msg)
+            survey = Survey(
+                self._transform(sky.sampling_name),
+                sky,
+                self._ring_mask,
+                None if noise is None else self._in_rings(noise),
+                np.asarray(self.beam),
             )
-            raise DataError(msg)
-        return cleaned_q, cleaned_u
+            held[sky] = _Prepared(survey, self.method.prepare(survey))  # type: ignore[union-attr]
+        return held[sky]
 
     def separate(self, q: Array, u: Array) -> EBMaps:
         """Separate Stokes Q and U into E and B.
 
         Parameters
         ----------
-        q, u : ndarray, real
+        q, u : ndarray, real, shape (..., *map)
             Stokes parameters, COSMO frame, any unit: HEALPix maps (12 nside^2,), MW maps
-            (L, 2 L - 1) or MWSS maps (L + 1, 2 L), pixelised as the mask is. Pixels where the mask
-            is 0 may hold anything.
+            (L, 2 L - 1) or MWSS maps (L + 1, 2 L), pixelised as the mask is; leading axes are a
+            batch. Pixels where the mask is 0 may hold anything.
 
         Returns
         -------
@@ -274,37 +315,36 @@ class EBSeparator:
         if q.shape != u.shape:
             msg = f"q has shape {q.shape} and u {u.shape}, which must be the same."
             raise ShapeError(msg)
-        sky = self._sky_of(q)
-        cleaned_q, cleaned_u = self._observed(q, u)
+        sky = sky_of_stack(q, self.mask, self.bandlimit, self.threads)
+        rows = (-1, *sky.map_shape)
+        p = observed_stack(q.reshape(rows), u.reshape(rows), self._ring_mask, nest=self.nest)
         prepared = self._prepared(sky)
-        kept = prepared.kept_fraction
+        survey, kept = prepared.survey, prepared.kept_fraction
         clock.stop("mask preparation")
-        p = cleaned_q + 1j * cleaned_u
-        masked = p if self._ring_mask is None else self._ring_mask * p
-        plm, fit = sky.polarisation_coefficients(masked)
-        clock.stop("harmonic analysis")
-        coefficients = prepared.apply(prepared.transform.analysis_harmonic(plm))
-        clock.stop("wavelet analysis")
-        eb_flm = self._fields(prepared.transform.synthesis_harmonic(coefficients))
-        eb = sky.scalar_map(eb_flm)
+        estimate = prepared.estimator.estimate(p)
+        clock.stop("estimation")
+        eb_flm = self._fields(survey.transform.synthesis_harmonic(estimate.coefficients))
+        eb = sky.scalar_map(eb_flm).reshape(q.shape)
         clock.stop("synthesis")
-        weights, weight = self._weight_maps(prepared, coefficients, q.shape)
+        weight = prepared.weight_map(estimate.coefficients)
         clock.stop("weight maps")
         info = SeparationInfo(
-            method=self.method,
+            method=self.method.name,  # type: ignore[union-attr]
+            choices=str(self.method),
             bandlimit=sky.bandlimit,
-            scales=prepared.transform.scales,
-            sky_fraction=prepared.sky_fraction,
+            scales=survey.transform.scales,
+            sky_fraction=survey.sky_fraction,
             kept_fraction=kept,
-            fit=fit,
+            fit=estimate.fit,
+            convergence=estimate.convergence,
             seconds=clock.seconds,
         )
         return EBMaps(
-            E=self._reordered(eb.real),
-            B=self._reordered(eb.imag),
-            weight=self._reordered(weight),
-            weights={j: self._reordered(values) for j, values in weights.items()},
-            coefficients=coefficients,
+            E=self._reordered(eb.real, sky),
+            B=self._reordered(eb.imag, sky),
+            weight=self._reordered(weight, sky),
+            weights={j: self._reordered(w, sky) for j, w in prepared.weight_maps.items()},
+            coefficients=estimate.coefficients.reshape_batch(q.shape[: q.ndim - len(rows) + 1]),
             info=info,
         )
 
@@ -319,28 +359,28 @@ class EBSeparator:
         Returns
         -------
         dict of (int or "scaling") to (ndarray, ndarray)
-            E and B of every scale and of the scaling part.
+            E and B of every scale and of the scaling part, of the shape of Q and U.
 
         Raises
         ------
         ShapeError, ParameterError
             If the coefficients are those of another transform. Maps of a separator that differs
-            in mask, taper or output only are not told apart: their bands do not add up.
+            in mask, method or output only are not told apart: their bands do not add up.
         """
-        sky = self._sky_of(maps.E)
-        transform = self._prepared(sky).transform
+        sky = sky_of_stack(maps.E, self.mask, self.bandlimit, self.threads)
+        transform = self._transform(sky.sampling_name)
         found: dict[int | str, tuple[Array, Array]] = {}
         for key in transform.shapes:
             flm = transform.synthesis_harmonic(maps.coefficients, parts=(key,))
             eb = sky.scalar_map(self._fields(flm))
-            found[key] = self._reordered(eb.real), self._reordered(eb.imag)
+            found[key] = self._reordered(eb.real, sky), self._reordered(eb.imag, sky)
         return found
 
     def _in_rings(self, values: Array) -> Array:
         return nested_to_ring(values) if self.nest and values.ndim == 1 else values
 
-    def _reordered(self, values: Array) -> Array:
-        if self.nest and values.ndim == 1:
+    def _reordered(self, values: Array, sky: AnySky) -> Array:
+        if self.nest and isinstance(sky, HealpixSky):
             return ring_to_nested(values)
         return np.ascontiguousarray(values)
 
@@ -353,20 +393,3 @@ class EBSeparator:
             return multiply_by_degree(-plm, factor)
         inverse = np.divide(1.0, factor, out=np.zeros_like(factor), where=factor > 0)
         return multiply_by_degree(-plm, inverse)
-
-    def _weight_maps(
-        self, prepared: PseudoMethod, coefficients: WaveletCoefficients, shape: tuple[int, ...]
-    ) -> tuple[dict[int, Array], Array]:
-        transform, sky = prepared.transform, prepared.sky
-        if self._ring_mask is None:
-            ones = np.ones(shape)
-            return {j: ones.copy() for j in transform.scales}, ones
-        weights, weight, total = {}, np.zeros(shape), 0.0
-        for j in transform.scales:
-            weights[j] = position_map(prepared.weights[j].mean(axis=0), transform, j, sky)
-            weights[j] *= self._ring_mask > 0
-            power = prepared.sphere_mean((np.abs(coefficients[j]) ** 2).mean(axis=0))
-            weight += power * weights[j]
-            total += power
-        # A map without any power is trusted where its mask is.
-        return weights, weight / total if total > 0 else np.mean(list(weights.values()), axis=0)

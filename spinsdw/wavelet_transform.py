@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Collection, Hashable
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -314,13 +314,17 @@ class SpinWaveletTransform:
                 quadrature=not adjoint,
             )
 
-    def _decompose(self, flm: Array, *, adjoint: bool) -> WaveletCoefficients:
-        flm = writable(check_flm(flm, self.bandlimit))
-        part = flm[..., : self._scaling_factor.size] * self._scaling_factor
+    def _decompose(
+        self, flm_of: Callable[[int | str], Array], *, adjoint: bool
+    ) -> WaveletCoefficients:
+        """Analyse every part, each from the harmonic coefficients ``flm_of`` gives for it."""
+        part = flm_of("scaling")[..., : self._scaling_factor.size] * self._scaling_factor
         transform = self._scaling_transform
         scaling = transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
         workspace = self._workspace()
-        wavelets = {j: self._scale_to_grid(flm, j, workspace, adjoint=adjoint) for j in self.scales}
+        wavelets = {
+            j: self._scale_to_grid(flm_of(j), j, workspace, adjoint=adjoint) for j in self.scales
+        }
         return WaveletCoefficients(scaling, wavelets, self._parameters)
 
     def _recompose(
@@ -411,7 +415,55 @@ class SpinWaveletTransform:
         DataError
             If a coefficient is not a finite number.
         """
-        return self._decompose(self._spin_part(flm), adjoint=False)
+        flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
+        return self._decompose(lambda _: flm, adjoint=False)
+
+    def analysis_by_part(self, flms: Mapping[int | str, Array]) -> WaveletCoefficients:
+        """Compute each part's coefficients from harmonic coefficients of its own.
+
+        What `analysis_harmonic` would give for each, of which one part is kept: for signals that
+        were estimated scale by scale.
+
+        Parameters
+        ----------
+        flms : mapping of (int or "scaling") to ndarray, shape (..., bandlimit**2), complex
+            The coefficients for every scale and for the scaling part, all of one shape.
+
+        Returns
+        -------
+        WaveletCoefficients
+            As `analysis_harmonic` returns them.
+
+        Raises
+        ------
+        ParameterError
+            If a part is missing or not known.
+        ShapeError
+            If a last axis is not bandlimit**2 long.
+        DataError
+            If a coefficient is not a finite number.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> transform = SpinWaveletTransform(8)
+        >>> parts = dict.fromkeys(transform.shapes, np.ones(64))
+        >>> coefficients = transform.analysis_by_part(parts)
+        >>> (coefficients - transform.analysis_harmonic(np.ones(64))).norm()
+        0.0
+        """
+        if set(flms) != set(self.shapes):
+            msg = (
+                f"flms has the parts {sorted(map(str, flms))}; it must have 'scaling' and the "
+                f"scales {self.scales}, no more and no less."
+            )
+            raise ParameterError(msg)
+        # Parts that share an array are checked once.
+        checked = {
+            id(flm): self._spin_part(writable(check_flm(flm, self.bandlimit)))
+            for flm in flms.values()
+        }
+        return self._decompose(lambda key: checked[id(flms[key])], adjoint=False)
 
     def synthesis_harmonic(
         self,
@@ -452,7 +504,8 @@ class SpinWaveletTransform:
 
     def adjoint_synthesis_harmonic(self, flm: Array) -> WaveletCoefficients:
         """Apply the adjoint of `synthesis_harmonic`; shapes of `analysis_harmonic`."""
-        return self._decompose(self._spin_part(flm), adjoint=True)
+        flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
+        return self._decompose(lambda _: flm, adjoint=True)
 
     def _spin_part(self, flm: Array) -> Array:
         """Drop degrees below |s|, which a signal of spin s does not have."""

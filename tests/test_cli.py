@@ -26,7 +26,8 @@ from spinsdw.harmonics import eb_to_spin, multiply_by_degree, polarisation_facto
 from spinsdw.healpix import UNSEEN, flm_to_map
 from spinsdw.maps_io import read_coefficients, read_map, write_maps
 from spinsdw.masks import galactic_cut, sky_fraction
-from spinsdw.polarisation import _METHODS, EBSeparator, Output
+from spinsdw.polarisation import EBSeparator, Output
+from spinsdw.separation import Pseudo, registry
 from spinsdw.simulation import gaussian_flm
 from tests.helpers import assert_close
 
@@ -119,14 +120,14 @@ def test_help_is_given_before_anything_heavy_is_loaded(command):
 
 
 def test_choices_are_those_of_the_separator():
-    assert set(METHODS) == set(_METHODS)
+    assert set(METHODS) == set(registry.METHODS)
     assert get_args(Output) == OUTPUTS
 
 
 def test_defaults_are_those_of_the_separator():
     parameters = inspect.signature(EBSeparator).parameters
     options = {option.name: option for option in separate.params}
-    names = ("bandlimit", "method", "directions", "dilation", "lowest_scale", "taper", "output")
+    names = ("bandlimit", "method", "directions", "dilation", "lowest_scale", "output")
     values = {name: options[name].get_default(click.Context(separate)) for name in names}
     # click has an object of its own for "none".
     given = {
@@ -162,10 +163,19 @@ def test_derivatives_are_e_and_b_times_n_l(maps, out):
 
 
 def test_command_writes_what_the_separator_returns(maps, out):
-    cut = ("--galactic-cut", "20", "--directions", "2", "--taper", "0.4", "--lowest-scale", "1")
+    cut = (
+        "--galactic-cut",
+        "20",
+        "--directions",
+        "2",
+        "--largest-share",
+        "0.4",
+        "--lowest-scale",
+        "1",
+    )
     run_well("separate", maps, *cut, "--coefficients", out=out)
     mask = galactic_cut(NSIDE, np.radians(20))
-    separator = EBSeparator(mask=mask, directions=2, taper=0.4, lowest_scale=1)
+    separator = EBSeparator(mask=mask, directions=2, method=Pseudo(0.4), lowest_scale=1)
     found = separator.separate(*stokes())
     observed = mask > 0
     for written, values in zip(eb_maps(out), (found.E, found.B), strict=True):
@@ -300,7 +310,11 @@ def test_files_say_what_they_are(maps, out):
     found = {key: header[key] for key in ("ORDERING", "COORDSYS", "POLCCONV", "TUNIT1", "TTYPE2")}
     assert found == dict(zip(found, ("RING", "G", "COSMO", "uK", "B"), strict=True))
     history = " ".join(header["HISTORY"])
-    for fact in ("maps.fits, columns Q_STOKES and U_STOKES", "below 20 degrees", "taper = 0.2"):
+    for fact in (
+        "maps.fits, columns Q_STOKES and U_STOKES",
+        "below 20 degrees",
+        "largest_share=0.2",
+    ):
         assert fact in history
     assert "TUNIT1" not in fits.getheader(out / "weights.fits", 1)
 
@@ -320,7 +334,7 @@ def test_summary_is_printed_and_written(maps, out):
 
 
 def test_no_scale_is_kept_on_more_than_the_observed_sky(maps, out):
-    text = run_well("separate", maps, "--galactic-cut", "20", "--taper", "0.9", out=out)
+    text = run_well("separate", maps, "--galactic-cut", "20", "--largest-share", "0.9", out=out)
     observed = float(re.search(r"sky +([\d.]+)% observed", text)[1])
     kept = [float(share) for share in re.findall(r"([\d.]+)%  scale", text)]
     assert len(kept) == 2
@@ -437,7 +451,7 @@ def test_what_a_header_lacks_is_asked_for_by_its_option(tmp_path, out):
         (["--directions", "0"], "--directions 0 "),
         (["--dilation", "1"], "--dilation 1.0 "),
         (["--lowest-scale", "9"], "--lowest-scale 9 "),
-        (["--taper", "0"], "--taper 0.0 "),
+        (["--largest-share", "0"], "--largest-share 0.0 "),
         (["--mask", "nowhere.fits"], "path='nowhere.fits' does not exist"),
     ],
 )

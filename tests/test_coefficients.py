@@ -296,3 +296,14 @@ def test_text_tells_what_is_held():
     assert text.startswith("WaveletCoefficients(bandlimit=8, spin=2, directions=2, sampling='mw')")
     assert "scaling: 1 x 1 complex128" in text
     assert "scale 3: 2 x 4 x 7 complex128" in text
+
+
+def test_batch_can_be_laid_out_anew():
+    transform = SpinWaveletTransform(8, 1, 2)
+    stack = transform.analysis_harmonic(random_flm(8, 1, batch=(6,)))
+    again = stack.reshape_batch((2, 3))
+    assert again.scaling.shape[:2] == again[2].shape[:2] == (2, 3)
+    assert np.array_equal(again[2][1, 0], stack[2][3])
+    assert (again.reshape_batch((6,)) - stack).norm() == 0
+    with pytest.raises(ShapeError, match=r"shape=\(5,\) holds 5 signals, but the batch \(6,\)"):
+        stack.reshape_batch((5,))

@@ -810,3 +810,15 @@ def test_round_trips_at_bandlimit_512_reach_1e_12(spin, directions):
     assert relative_error(found, flm) <= 1e-12
     maps = transform.harmonic.synthesis(flm)
     assert relative_error(transform.synthesis(transform.analysis(maps)), maps) <= 1e-12
+
+
+def test_analysis_by_part_takes_each_part_from_its_own_coefficients():
+    transform = SpinWaveletTransform(16, 2, 2)
+    flms = {key: random_flm(16, 2, seed=i) for i, key in enumerate(transform.shapes)}
+    found = transform.analysis_by_part(flms)
+    for key, flm in flms.items():
+        alone = transform.analysis_harmonic(flm)
+        of = [c.scaling if key == "scaling" else c[key] for c in (found, alone)]
+        assert np.array_equal(*of)
+    with pytest.raises(ParameterError, match=r"flms has the parts \['scaling'\]; it must have"):
+        transform.analysis_by_part({"scaling": flms["scaling"]})

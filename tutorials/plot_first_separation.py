@@ -49,10 +49,11 @@ for panel, values, title in zip(axes, (q, u), "QU", strict=True):
 # --------------
 # Two lines. The separator works out, for every wavelet at every place and in every orientation,
 # which share of its energy lies in the hole, and gives less weight to those with more. A
-# coefficient with a share of ``taper`` or more is dropped.
+# coefficient with a share of ``largest_share`` or more is dropped.
 from spinsdw import EBSeparator
+from spinsdw.separation import Pseudo
 
-separator = EBSeparator(bandlimit, mask, directions=3, taper=0.2)
+separator = EBSeparator(bandlimit, mask, directions=3, method=Pseudo(largest_share=0.2))
 maps = separator.separate(q, u)
 
 

@@ -130,11 +130,9 @@ _method_options = _decorate(
     click.option("--dilation", type=float, default=2.0, show_default=True, help="Ratio of scales."),
     click.option("--lowest-scale", type=int, help="Larger structures are one part [2]."),
     click.option(
-        "--taper",
+        "--largest-share",
         type=float,
-        default=0.2,
-        show_default=True,
-        help="Share of a wavelet's energy in the hole at which it is dropped.",
+        help="Method pseudo: share of a wavelet's energy in the hole at which it is dropped [0.2].",
     ),
     click.option(
         "--output-kind",
@@ -199,7 +197,10 @@ def separate(qfile: str, ufile: str | None, **options: Any) -> None:
         galactic_cut=options["galactic_cut"],
         fill_holes=options["fill_holes"],
     )
-    names = "bandlimit method directions dilation lowest_scale taper output threads"
+    if options["largest_share"] is not None and options["method"] != "pseudo":
+        msg = f"--largest-share is a choice of --method pseudo, not of {options['method']}."
+        raise click.UsageError(msg)
+    names = "bandlimit method directions dilation lowest_scale largest_share output threads"
     given = {name: options[name] for name in names.split() if options[name] is not None}
     wanted = SeparationRequest(maps, mask, _output(options), given, options["max_memory"])
     _run(wanted)

@@ -142,10 +142,12 @@ def write_files(folder: Path, wanted: SeparationRequest, inputs: Inputs, maps: E
 def _history(wanted: SeparationRequest, inputs: Inputs, maps: EBMaps) -> list[str]:
     """Return in ASCII what the files were made from and how."""
     settings = {"bandlimit": maps.info.bandlimit} | dict(wanted.settings)
+    chosen = {"method", "largest_share", "threads"}
     lines = [
         "E and B separated from Q and U by spin wavelets",
         *([wanted.remark] if wanted.remark else []),
         *(f"{name}: {fact}" for name, fact in inputs.facts.items()),
-        *(f"{name} = {value!r}" for name, value in settings.items() if name != "threads"),
+        f"method = {maps.info.choices}",
+        *(f"{name} = {value!r}" for name, value in settings.items() if name not in chosen),
     ]
     return [line.encode("ascii", "backslashreplace").decode() for line in lines]

@@ -19,6 +19,7 @@ from spinsdw.errors import ConvergenceWarning, PrecisionWarning
 from spinsdw.files import atomic_output
 from spinsdw.healpix import default_bandlimit
 from spinsdw.polarisation import EBSeparator
+from spinsdw.separation.pseudo import Pseudo
 from spinsdw.warmup import warm_up
 
 __all__ = ["run_separation"]
@@ -71,7 +72,11 @@ def run_separation(wanted: SeparationRequest) -> str:
 
 def _separator(wanted: SeparationRequest, inputs: Inputs) -> EBSeparator:
     settings: dict[str, Any] = {"bandlimit": default_bandlimit(inputs.maps.nside)}
-    return EBSeparator(**(settings | dict(wanted.settings)), mask=inputs.mask)
+    settings |= wanted.settings
+    share = settings.pop("largest_share", None)
+    if share is not None:
+        settings["method"] = Pseudo(share)
+    return EBSeparator(**settings, mask=inputs.mask)
 
 
 def _is_first_run() -> bool:

@@ -1,1 +1,11 @@
-"""What the E/B separation is made of: skies to work on, energy shares, and one file per method."""
+"""The methods of E/B separation: one file each, and what they share.
+
+An object of one of these classes is a method with its free choices; `spinsdw.EBSeparator` takes it,
+or its name, as ``method``.
+"""
+
+from __future__ import annotations
+
+from spinsdw.separation.pseudo import Pseudo
+
+__all__ = ["Pseudo"]

@@ -10,84 +10,65 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from spinsdw.coefficients import WaveletCoefficients
+from spinsdw.errors import ParameterError
 from spinsdw.masks import taper
-from spinsdw.separation.energy_share import energy_shares
-from spinsdw.separation.skies import GridSky, HealpixSky
-from spinsdw.spin_transform import SpinHarmonicTransform
-from spinsdw.wavelet_transform import SpinWaveletTransform
+from spinsdw.separation.method import Estimate
+from spinsdw.separation.survey import Survey
 
-__all__ = ["PseudoMethod"]
+__all__ = ["Pseudo", "PseudoEstimator"]
 
 Array = np.ndarray[Any, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class PseudoMethod:
-    """Weights of the pseudo estimator for one mask, computed once.
+@dataclass(frozen=True)
+class Pseudo:
+    """Weigh the coefficients of the masked map by the sky their wavelets see (eq-share-weights).
 
     Parameters
     ----------
-    transform : SpinWaveletTransform
-        Spin-2 wavelets.
-    sky : HealpixSky or GridSky
-        Where the mask lives.
-    mask : ndarray or None
-        Mask in [0, 1]; None for the full sky.
-    largest_share : float
-        Share of energy in the hole at which a coefficient is dropped.
+    largest_share : float, default 0.2
+        Share of its energy in the hole, in (0, 1], at which a coefficient is dropped.
+
+    Raises
+    ------
+    ParameterError
+        If the share is out of range.
     """
 
-    transform: SpinWaveletTransform
-    sky: HealpixSky | GridSky
-    mask: Array | None
-    largest_share: float
+    name: ClassVar[str] = "pseudo"
+    largest_share: float = 0.2
 
-    @functools.cached_property
-    def shares(self) -> dict[int | str, Array]:
-        """Share of each wavelet's energy in the holes; shapes of the coefficients."""
-        if self.mask is None:
-            return {key: np.zeros(shape) for key, shape in self.transform.shapes.items()}
-        holes = 1.0 - self.mask
-        return energy_shares(self.transform, lambda size: self.sky.integrals(holes, size))
+    def __post_init__(self) -> None:
+        value = self.largest_share
+        if not isinstance(value, int | float | np.number) or not 0 < value <= 1:
+            msg = f"largest_share={value!r} must be a share of energy in (0, 1]; 0.2 is usual."
+            raise ParameterError(msg)
+
+    def prepare(self, survey: Survey) -> PseudoEstimator:
+        """Return the estimator for a survey."""
+        return PseudoEstimator(survey, float(self.largest_share))
+
+
+@dataclass(frozen=True, eq=False)
+class PseudoEstimator:
+    """The pseudo estimator for one survey."""
+
+    survey: Survey
+    largest_share: float
 
     @functools.cached_property
     def weights(self) -> dict[int | str, Array]:
         """1 where a wavelet sees no hole, falling smoothly to 0 at ``largest_share``."""
-        return {key: 1.0 - taper(share / self.largest_share) for key, share in self.shares.items()}
+        shares = self.survey.shares
+        return {key: 1.0 - taper(share / self.largest_share) for key, share in shares.items()}
 
-    @property
-    def sky_fraction(self) -> float:
-        """Mean of the mask over the sphere."""
-        if self.mask is None:
-            return 1.0
-        return float(self.sky.integrals(self.mask, 1)[0].real / np.sqrt(4 * np.pi))
-
-    @functools.cached_property
-    def kept_fraction(self) -> dict[int | str, float]:
-        """Mean of the weights over the sphere and the orientations, for each scale."""
-        if self.mask is None:
-            return dict.fromkeys(self.weights, 1.0)
-        return {
-            key: self.sphere_mean(values.reshape(-1, *values.shape[-2:]).mean(axis=0))
-            for key, values in self.weights.items()
-        }
-
-    def sphere_mean(self, values: Array) -> float:
-        """Return the mean over the sphere of non-negative values at the positions of a scale."""
-        # Samples crowd at the poles: a plain mean would be one of the poles.
-        bandlimit = values.shape[1] // 2 if self.sky.sampling_name == "mwss" else values.shape[0]
-        transform = SpinHarmonicTransform(
-            bandlimit, sampling=self.sky.sampling_name, real=True, threads=self.transform.threads
-        )
-        mean = transform.analysis(values)[0].real / np.sqrt(4 * np.pi)
-        # A mean lies between the extremes; the quadrature of rough values may miss that a little.
-        return float(np.clip(mean, values.min(), values.max()))
-
-    def apply(self, coefficients: WaveletCoefficients) -> WaveletCoefficients:
-        """Weigh the coefficients of the masked map."""
-        return coefficients if self.mask is None else coefficients * self.weights
+    def estimate(self, p: Array) -> Estimate:
+        """Separate maps, shape (batch, *map)."""
+        survey = self.survey
+        plm, fit = survey.sky.polarisation_coefficients(survey.footprint * p)
+        coefficients = survey.transform.analysis_harmonic(plm)
+        return Estimate(coefficients if survey.mask is None else coefficients * self.weights, fit)

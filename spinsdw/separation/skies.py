@@ -45,6 +45,11 @@ class Sky(Protocol):
         ...
 
     @property
+    def map_shape(self) -> tuple[int, ...]:
+        """Shape of one map."""
+        ...
+
+    @property
     def points(self) -> tuple[Array, Array]:
         """Colatitudes and longitudes of the points in radians, of the shape of a map."""
         ...
@@ -87,6 +92,11 @@ class HealpixSky:
     def sampling_name(self) -> str:
         """Kind of grid the wavelet coefficients of this sky live on."""
         return "mw"
+
+    @property
+    def map_shape(self) -> tuple[int, ...]:
+        """Shape of one map."""
+        return (12 * self.nside**2,)
 
     @property
     def points(self) -> tuple[Array, Array]:
@@ -144,6 +154,11 @@ class GridSky:
     def sampling_name(self) -> str:
         """Kind of grid the wavelet coefficients of this sky live on."""
         return self.sampling.name
+
+    @property
+    def map_shape(self) -> tuple[int, ...]:
+        """Shape of one map."""
+        return self.sampling.shape
 
     @property
     def points(self) -> tuple[Array, Array]:

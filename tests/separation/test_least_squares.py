@@ -207,7 +207,9 @@ def test_precision_is_the_mean_inverse_noise():
 
 @pytest.mark.parametrize("level", [0.0, -1.0, np.nan, np.inf])
 def test_noise_level_must_be_positive(level):
-    with pytest.raises(ParameterError, match="noise_level=.* must be positive and finite; a noise"):
+    with pytest.raises(
+        ParameterError, match=r"noise_level=.* must be positive and finite; a noise"
+    ):
         Observation(SKIES[0], np.ones((8, 15)), level)
 
 

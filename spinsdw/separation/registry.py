@@ -1,0 +1,37 @@
+"""The methods of separation by name."""
+
+from __future__ import annotations
+
+from spinsdw.errors import ParameterError
+from spinsdw.separation.method import Method
+from spinsdw.separation.pseudo import Pseudo
+from spinsdw.separation.report import check_choice
+
+__all__ = ["METHODS", "resolve_method"]
+
+METHODS: dict[str, type[Method]] = {kind.name: kind for kind in (Pseudo,)}
+
+
+def resolve_method(method: object) -> Method:
+    """Return the description of a method, given as such or by its name.
+
+    Raises
+    ------
+    ParameterError
+        If a name is not known, or an object is no method.
+
+    Examples
+    --------
+    >>> resolve_method("pseudo")
+    Pseudo(largest_share=0.2)
+    """
+    if isinstance(method, str):
+        check_choice("method", method, tuple(METHODS))
+        return METHODS[method]()
+    if not isinstance(method, tuple(METHODS.values())):
+        msg = (
+            f"method={method!r} must be a name among {', '.join(map(repr, METHODS))}, or an object "
+            "of one of their classes in spinsdw.separation."
+        )
+        raise ParameterError(msg)
+    return method  # type: ignore[return-value]
