@@ -37,6 +37,40 @@ def _is_number(value: object) -> bool:
     return isinstance(value, numbers.Complex)
 
 
+def _part_name(key: int | str) -> str:
+    return "the scaling part" if key == "scaling" else f"scale {key}"
+
+
+def _fitting(given: object, values: Array, key: int | str, name: str) -> Array:
+    """Return what was given for a part as an array, after checking that it broadcasts to it."""
+    array = np.asarray(given)
+    sizes = zip(reversed(array.shape), reversed(values.shape), strict=False)
+    if array.ndim > values.ndim or any(one not in {1, other} for one, other in sizes):
+        msg = (
+            f"{name} for {_part_name(key)} has shape {array.shape}; it must be a number or "
+            f"broadcast to {values.shape}."
+        )
+        raise ShapeError(msg)
+    return array
+
+
+# What multiplies a value, from the ratio T / |w| < 1.
+_SHRINKAGES: dict[str, Callable[[Array], Array]] = {
+    "hard": np.ones_like,
+    "soft": lambda ratio: 1 - ratio,
+    "garrote": lambda ratio: 1 - ratio**2,
+}
+
+
+def _shrink(values: Array, level: Array, factor: Callable[[Array], Array]) -> Array:
+    size = np.abs(values)
+    if size.dtype.kind != "f":
+        size = size.astype(np.float64)
+    is_kept = size > level
+    ratio = np.divide(level, size, out=np.zeros_like(size), where=is_kept)
+    return np.where(is_kept, factor(ratio) * values, 0)
+
+
 class WaveletCoefficients:
     """Wavelet and scaling coefficients of one signal, or of a batch of signals.
 
@@ -62,7 +96,9 @@ class WaveletCoefficients:
     The arrays are held as they are, not copied, and can only be read: take ``a[j].copy()`` to
     change one.
     Arithmetic acts on every number: ``a + b``, ``a - b``, ``2 * a``, and ``a * {j: factor}`` scale
-    by scale, "scaling" being the key of the scaling part; `map` applies any function.
+    by scale, "scaling" being the key of the scaling part; `map` applies any function and
+    `threshold` shrinks. `norm` is a sum over the samples; the integrals that analysis preserves are
+    in `spinsdw.energy`.
 
     Examples
     --------
@@ -197,13 +233,16 @@ class WaveletCoefficients:
 
         return self._with(reshape)
 
-    def map(self, function: Callable[[Array], Array]) -> WaveletCoefficients:
-        """Apply a function of arrays to the scaling part and to every scale.
+    def map(
+        self, function: Callable[[Array], Array] | Mapping[Any, Callable[[Array], Array]]
+    ) -> WaveletCoefficients:
+        """Apply a function of arrays to the scaling part and to every scale, or one to each.
 
         Parameters
         ----------
-        function : callable
-            Takes an array and returns one of the same shape.
+        function : callable or mapping of int or "scaling" to callable
+            Takes an array and returns one of the same shape. Parts that a mapping leaves out stay
+            as they are.
 
         Returns
         -------
@@ -213,11 +252,26 @@ class WaveletCoefficients:
         Raises
         ------
         ShapeError
-            If the function changes a shape.
+            If a function changes a shape.
+        ParameterError
+            If a key of the mapping names no part.
+
+        Examples
+        --------
+        >>> wavelets = {0: np.ones((1, 1, 1)), 1: np.ones((1, 2, 3))}
+        >>> one = WaveletCoefficients(np.zeros((1, 1)), wavelets, {"directions": 1})
+        >>> float(one.map({1: np.negative})[1].sum())
+        -6.0
         """
+        functions = function
+        if isinstance(functions, Mapping):
+            self._check_keys(functions, "functions")
 
         def apply(key: int | str, values: Array) -> Array:
-            found = function(values)
+            call = functions.get(key) if isinstance(functions, Mapping) else functions
+            if call is None:
+                return values
+            found = call(values)
             refuse_masked(found, "what function returned")
             result = np.asarray(found)
             if result.shape != values.shape:
@@ -259,25 +313,69 @@ class WaveletCoefficients:
             return NotImplemented
         return self._combine(other, operator.sub)
 
-    def _weigh(self, factors: Mapping[Any, Any]) -> WaveletCoefficients:
-        unknown = set(factors) - {"scaling", *self.scales}
+    def _check_keys(self, given: Mapping[Any, Any], name: str) -> None:
+        unknown = set(given) - {"scaling", *self.scales}
         if unknown:
-            msg = f"factors for {sorted(map(str, unknown))} match no scale of {self.scales}."
+            msg = f"{name} for {sorted(map(str, unknown))} match no scale of {self.scales}."
             raise ParameterError(msg)
 
-        def multiply(key: int | str, values: Array) -> Array:
-            factor = np.asarray(factors.get(key, 1.0))
-            sizes = zip(reversed(factor.shape), reversed(values.shape), strict=False)
-            if factor.ndim > values.ndim or any(one not in {1, other} for one, other in sizes):
-                name = "the scaling part" if key == "scaling" else f"scale {key}"
-                msg = (
-                    f"factor for {name} has shape {factor.shape}; it must be a number or broadcast "
-                    f"to {values.shape}."
-                )
-                raise ShapeError(msg)
-            return values * factor
+    def _weigh(self, factors: Mapping[Any, Any]) -> WaveletCoefficients:
+        self._check_keys(factors, "factors")
+        return self._with(
+            lambda key, values: values * _fitting(factors.get(key, 1.0), values, key, "factor")
+        )
 
-        return self._with(multiply)
+    def threshold(
+        self, thresholds: float | Mapping[Any, Any], *, rule: str = "hard"
+    ) -> WaveletCoefficients:
+        """Shrink the coefficients that are small: hard, soft or by the garrote in between.
+
+        Parameters
+        ----------
+        thresholds : float or mapping of int or "scaling" to float or array
+            T >= 0. A number holds for every scale and leaves the scaling part; a mapping holds for
+            the parts it names, by a number or by an array that broadcasts to the part's shape.
+        rule : {"hard", "soft", "garrote"}
+            What multiplies w where |w| > T: 1, ``1 - T / |w|`` or ``1 - T**2 / |w|**2``. Zero
+            elsewhere. |w| is the modulus, so that phases stay.
+
+        Returns
+        -------
+        WaveletCoefficients
+            The shrunk coefficients.
+
+        Raises
+        ------
+        ParameterError
+            If the rule or a part is not known.
+        ShapeError
+            If an array does not broadcast to its part.
+        DataError
+            If a threshold is negative or not a number.
+
+        Examples
+        --------
+        >>> one = WaveletCoefficients(np.ones((1, 1)), {0: np.full((1, 1, 1), -3.0)},
+        ...                           {"directions": 1})
+        >>> float(one.threshold(1.0, rule="soft")[0].item())
+        -2.0
+        """
+        if rule not in _SHRINKAGES:
+            msg = f"rule={rule!r} must be one of {sorted(_SHRINKAGES)}; 'hard' keeps or drops."
+            raise ParameterError(msg)
+        given = thresholds if isinstance(thresholds, Mapping) else dict.fromkeys(self, thresholds)
+        self._check_keys(given, "thresholds")
+
+        def shrink(key: int | str, values: Array) -> Array:
+            if key not in given:
+                return values
+            level = _fitting(given[key], values, key, "threshold")
+            if level.dtype.kind not in "biuf" or not np.all(level >= 0):
+                msg = f"threshold for {_part_name(key)} must hold real numbers of at least 0."
+                raise DataError(msg)
+            return _shrink(values, level, _SHRINKAGES[rule])
+
+        return self._with(shrink)
 
     def __mul__(self, factor: complex | Mapping[Any, Any]) -> WaveletCoefficients:
         if isinstance(factor, Mapping):

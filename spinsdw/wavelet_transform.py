@@ -394,6 +394,16 @@ class SpinWaveletTransform:
                 )
                 raise ParameterError(msg)
 
+    def arrays(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
+        """Return the arrays of coefficients, "scaling" first, after checking that they are ours.
+
+        Raises
+        ------
+        ShapeError, ParameterError, DataError
+            As `synthesis_harmonic`.
+        """
+        return self._checked(coefficients)
+
     def analysis_harmonic(self, flm: Array) -> WaveletCoefficients:
         """Compute wavelet coefficients from harmonic coefficients.
 

@@ -307,3 +307,84 @@ def test_batch_can_be_laid_out_anew():
     assert (again.reshape_batch((6,)) - stack).norm() == 0
     with pytest.raises(ShapeError, match=r"shape=\(5,\) holds 5 signals, but the batch \(6,\)"):
         stack.reshape_batch((5,))
+
+
+def test_map_applies_one_function_to_each_part_named():
+    one = make()
+    found = one.map({3: np.conj, "scaling": np.negative})
+    assert_equal(found, -one.scaling, {1: one[1], 3: one[3].conj()})
+    with pytest.raises(ParameterError, match=r"functions for \['2'\] match no scale of \(1, 3\)"):
+        one.map({2: np.conj})
+
+
+RULES = {
+    "hard": lambda size, _: size,
+    "soft": lambda size, level: size - level,
+    "garrote": lambda size, level: size - level**2 / np.where(size > 0, size, 1),
+}
+
+
+def shrunk(values, level, rule):
+    """w = |w| e^{i a} becomes rule(|w|, T) e^{i a} where |w| > T, and 0 elsewhere."""
+    size = np.abs(values)
+    return np.where(size > level, RULES[rule](size, level) * np.exp(1j * np.angle(values)), 0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("batch", [(), (3,)])
+def test_a_number_thresholds_every_scale_and_leaves_the_scaling_part(rule, batch):
+    one = make(batch)
+    found = one.threshold(1.2, rule=rule)
+    assert np.array_equal(found.scaling, one.scaling)
+    for j in one:
+        assert_close(found[j], shrunk(one[j], 1.2, rule), ulps=8)
+        assert np.any(found[j] == 0)
+        assert np.any(found[j] != 0)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_thresholds_hold_scale_by_scale_and_number_by_number(rule):
+    one = make()
+    levels = np.random.default_rng(3).uniform(0, 2, one[3].shape)
+    found = one.threshold({"scaling": 0.1, 3: levels}, rule=rule)
+    assert_close(found.scaling, shrunk(one.scaling, 0.1, rule), ulps=8)
+    assert np.array_equal(found[1], one[1])
+    assert_close(found[3], shrunk(one[3], levels, rule), ulps=8)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_no_threshold_keeps_all_and_an_infinite_one_nothing(rule):
+    one = make()
+    assert_equal(one.threshold(0, rule=rule), one.scaling, {j: one[j] for j in one})
+    nothing = one.threshold({"scaling": np.inf, 1: np.inf, 3: np.inf}, rule=rule)
+    assert nothing.norm() == 0
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.complex64, np.complex128])
+@pytest.mark.parametrize("rule", RULES)
+def test_thresholding_keeps_the_precision(dtype, rule):
+    values = make().map(lambda v: v.real.astype(dtype))
+    found = values.threshold({1: 1.0, 3: np.full((4, 7), 0.5)}, rule=rule)
+    assert {found[j].dtype for j in found} == {np.dtype(dtype)}
+
+
+def test_thresholds_of_whole_numbers_are_not_rounded():
+    one = WaveletCoefficients(np.zeros((1, 1)), {0: np.full((2, 1, 1), 3)}, PARAMETERS)
+    assert one.threshold(0.5, rule="soft")[0][0, 0, 0] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("thresholds", "rule", "error", "message"),
+    [
+        (1.0, "firm", ParameterError, "rule='firm' must be one of"),
+        ({2: 1.0}, "hard", ParameterError, r"thresholds for \['2'\] match no scale"),
+        (-1.0, "hard", DataError, "threshold for scale 1 must hold real numbers of at least 0"),
+        ({3: np.nan}, "soft", DataError, "threshold for scale 3 must hold real numbers"),
+        ({1: 1j}, "hard", DataError, "threshold for scale 1 must hold real numbers"),
+        ({"scaling": "a"}, "hard", DataError, "threshold for the scaling part must hold real"),
+        ({1: np.ones((3, 3))}, "hard", ShapeError, "threshold for scale 1 has shape"),
+    ],
+)
+def test_bad_thresholds_are_refused(thresholds, rule, error, message):
+    with pytest.raises(error, match=message):
+        make().threshold(thresholds, rule=rule)

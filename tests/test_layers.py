@@ -33,6 +33,7 @@ LAYERS = (  # bottom to top
     {"wigner_transform"},
     {"coefficients"},
     {"wavelet_transform"},
+    {"energy"},
     {"healpix"},
     {"masks"},
     {"maps_io"},
