@@ -8,7 +8,7 @@ import pathlib
 import pytest
 
 from spinsdw.errors import FileFormatError, OutputExistsError, ParameterError
-from spinsdw.files import atomic_output, input_path, output_path
+from spinsdw.files import atomic_directory, atomic_output, input_path, output_path
 
 
 @pytest.mark.parametrize(
@@ -110,3 +110,68 @@ def test_output_has_the_permissions_of_any_new_file(tmp_path):
 def test_paths_may_be_texts_or_path_objects(tmp_path):
     (tmp_path / "a").touch()
     assert input_path(str(tmp_path / "a")) == input_path(pathlib.Path(tmp_path / "a"))
+
+
+def fill(directory, text):
+    (directory / "index").write_text(text)
+
+
+def test_directory_is_whole_or_absent(tmp_path):
+    path = tmp_path / "store"
+
+    def write_half():
+        with atomic_directory(path, "index", overwrite=True) as directory:
+            fill(directory, "half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_half()
+    assert not os.listdir(tmp_path)
+    with atomic_directory(path, "index") as directory:
+        fill(directory, "old")
+    with pytest.raises(RuntimeError):
+        write_half()
+    assert (path / "index").read_text() == "old"
+    assert os.listdir(tmp_path) == ["store"]
+
+
+def test_directory_is_replaced_only_when_asked_and_when_it_has_the_marker(tmp_path):
+    path = tmp_path / "store"
+    with atomic_directory(path, "index") as directory:
+        fill(directory, "old")
+    with (
+        pytest.raises(OutputExistsError, match="exists already"),
+        atomic_directory(path, "index"),
+    ):
+        pass
+    with (
+        pytest.raises(ParameterError, match="holds no other and is not replaced"),
+        atomic_directory(path, "other", overwrite=True),
+    ):
+        pass
+    with atomic_directory(path, "index", overwrite=True) as directory:
+        fill(directory, "new")
+    assert (path / "index").read_text() == "new"
+    assert os.listdir(tmp_path) == ["store"]
+
+
+def test_older_directory_comes_back_when_the_name_cannot_be_taken(tmp_path, monkeypatch):
+    path = tmp_path / "store"
+    with atomic_directory(path, "index") as directory:
+        fill(directory, "old")
+    rename = pathlib.Path.rename
+
+    def fail_for_the_new(place, target):
+        if place.name.endswith(".part"):
+            msg = "the name is taken"
+            raise OSError(msg)
+        return rename(place, target)
+
+    monkeypatch.setattr(pathlib.Path, "rename", fail_for_the_new)
+    with (
+        pytest.raises(OSError, match="the name is taken"),
+        atomic_directory(path, "index", overwrite=True) as directory,
+    ):
+        fill(directory, "new")
+    assert (path / "index").read_text() == "old"
+    assert os.listdir(tmp_path) == ["store"]

@@ -56,7 +56,7 @@ HOMES = {  # the only parts that may import these packages
     "matplotlib": {"plotting"},
     "dask": {"ensemble"},
     "distributed": {"ensemble"},
-    "zarr": {"ensemble"},
+    "zarr": {"ensemble", "maps_io"},
     "click": {"cli"},
     "rich": {"cli"},
 }

@@ -14,7 +14,6 @@ from astropy.io import fits
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.datasets import wmap_synchrotron_paths
 from spinsdw.errors import (
     DataError,
@@ -29,14 +28,11 @@ from spinsdw.healpix import UNSEEN, bad_pixel_mask
 from spinsdw.maps_io import (
     HealpixMap,
     PolarisationMaps,
-    read_coefficients,
     read_map,
     read_mask,
     read_polarisation,
-    write_coefficients,
     write_maps,
 )
-from tests.helpers import random_flm
 
 healpy = pytest.importorskip("healpy")
 
@@ -655,71 +651,3 @@ def test_what_cannot_be_written_is_refused_and_leaves_no_file(
     with pytest.raises(error, match=message):
         write_maps(tmp_path / place.get("path", "t.fits"), **arguments)
     assert not list(tmp_path.iterdir())
-
-
-# Wavelet coefficients
-
-
-def make_coefficients(*, real=False, batch=()):
-    def draw(seed, *shape):
-        count = int(np.prod(shape))
-        side = int(np.ceil(np.sqrt(count)))
-        values = random_flm(side, seed=seed)[:count].reshape(shape)
-        return values.real.copy() if real else values
-
-    parameters = {
-        "bandlimit": 8,
-        "spin": 0 if real else 2,
-        "directions": 3,
-        "dilation": 1.1 ** (1 / 7),
-        "lowest_scale": 1,
-        "sampling": "mw",
-        "multiresolution": True,
-        "real": real,
-    }
-    scales = {j: draw(j, *batch, 3, 2**j, 2 ** (j + 1) - 1) for j in (1, 2, 3)}
-    return WaveletCoefficients(draw(0, *batch, 2, 3), scales, parameters)
-
-
-@pytest.mark.parametrize("real", [False, True])
-@pytest.mark.parametrize("batch", [(), (2,)])
-def test_written_coefficients_are_read_back_bit_for_bit(tmp_path, real, batch):
-    written = make_coefficients(real=real, batch=batch)
-    found = read_coefficients(write_coefficients(tmp_path / "w.fits", written))
-    assert found.parameters == written.parameters
-    assert found.scales == written.scales
-    np.testing.assert_array_equal(found.scaling, written.scaling)
-    for j in written.scales:
-        np.testing.assert_array_equal(found[j], written[j])
-        assert found[j].dtype == written[j].dtype
-
-
-def test_coefficient_file_is_checked_to_the_last_byte(tmp_path):
-    path = write_coefficients(tmp_path / "w.fits", make_coefficients())
-    whole = path.read_bytes()
-    damaged = bytearray(whole)
-    damaged[len(whole) - 5000] ^= 1
-    for data in (damaged, *(whole[:end] for end in (*range(0, len(whole), 2880), -1))):
-        path.write_bytes(data)
-        with pytest.raises(FileFormatError, match=r"fails|is truncated|has the ext|is not a FITS"):
-            read_coefficients(path)
-
-
-def test_file_of_something_else_holds_no_coefficients(tmp_path):
-    with pytest.raises(FileFormatError, match="has no card PARAMS with parameters; give a file"):
-        read_coefficients(write_planck(tmp_path / "p.fits"))
-    path = write_coefficients(tmp_path / "w.fits", make_coefficients())
-    with pytest.raises(MemoryBudgetError, match="max_memory=100 bytes"):
-        read_coefficients(path, max_memory=100)
-    with pytest.raises(OutputExistsError, match="exists already"):
-        write_coefficients(path, make_coefficients())
-
-
-def test_parameters_without_a_plain_form_are_refused(tmp_path):
-    coefficients = make_coefficients()
-    for odd in (object(), np.nan, 1j):
-        parameters = {**coefficients.parameters, "odd": odd}
-        scales = {j: coefficients[j] for j in coefficients.scales}
-        changed = WaveletCoefficients(coefficients.scaling, scales, parameters)
-        with pytest.raises(ParameterError, match="must be numbers, texts or lists of them"):
-            write_coefficients(tmp_path / "w.fits", changed)

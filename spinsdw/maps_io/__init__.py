@@ -1,8 +1,8 @@
-"""Maps and wavelet coefficients in FITS files: the only part of the package that opens them.
+"""Maps and wavelet coefficients in files: the only part of the package that opens FITS and Zarr.
 
 `guard` holds a file's promises against its length, `layout` the header of a HEALPix table,
 `reading` and `writing` go between files and arrays in RING order, `coefficients` keeps wavelet
-coefficients.
+coefficients, `store` is their Zarr form.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Keep wavelet coefficients in a FITS file: one image per scale, the parameters in the header.
+"""Keep wavelet coefficients: in one FITS file, or in a Zarr store of one chunk per orientation.
+
+The FITS file has one image per scale and the parameters in its header:
 
 ====================  =======================================================================
 unit                  holds
@@ -9,61 +11,64 @@ extension SCALE_j     the coefficients of scale j, for every j
 ====================  =======================================================================
 
 An array of complex numbers is an image with one more axis in front, of length two: real parts,
-then imaginary parts; the card PARTS says ``COMPLEX`` or ``REAL``.
+then imaginary parts; the card PARTS says ``COMPLEX`` or ``REAL``. `store` says what is in the
+other.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
-from spinsdw.errors import DataError, ParameterError
 from spinsdw.maps_io.guard import GuardedFile, open_guarded, refuse
+from spinsdw.maps_io.parameters import parameters_from_json, parameters_to_json
+from spinsdw.maps_io.store import read_store, write_store
 from spinsdw.maps_io.writing import Cards, provenance, write_hdus
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
 __all__ = ["read_coefficients", "write_coefficients"]
 
 _SCALE = re.compile(r"SCALE_(\d+)")
+_WRITTEN_BY_US = "give a file that write_coefficients wrote"
 
 
 def write_coefficients(
     path: str | os.PathLike[str], coefficients: WaveletCoefficients, *, overwrite: bool = False
 ) -> Path:
-    """Write wavelet coefficients to a FITS file, complete or not at all, in full precision.
+    """Write wavelet coefficients, complete or not at all, in full precision.
 
     Parameters
     ----------
     path : str or path-like
-        A local file in an existing directory.
+        A local place in an existing directory. A name that ends in ".zarr" becomes a Zarr store, a
+        directory with one file for each scale and orientation; any other a FITS file.
     coefficients : WaveletCoefficients
         Their parameters must be numbers, texts, booleans, None, and lists of these.
     overwrite : bool
-        Replace a file that is there.
+        Replace a file, or a Zarr store, that is there.
 
     Returns
     -------
     Path
-        The file written.
+        What was written.
 
     Raises
     ------
     OutputExistsError
-        The file exists and `overwrite` is False.
+        The name is taken and `overwrite` is False.
     ParameterError
-        A parameter cannot be written.
+        A parameter cannot be written, or the directory to replace is no Zarr store.
     DataError
-        An array is neither float64 nor complex128.
+        An array is none of float32, float64, complex64 and complex128.
+    MissingPackageError
+        zarr is not installed and the name ends in ".zarr".
 
     See Also
     --------
@@ -82,10 +87,13 @@ def write_coefficients(
     """
     arrays = {"SCALING": coefficients.scaling}
     arrays |= {f"SCALE_{j}": coefficients[j] for j in coefficients.scales}
+    text = parameters_to_json(coefficients)
+    if _is_store(path):
+        return write_store(path, arrays, text, overwrite=overwrite)
     images = [_image(name, np.asarray(values)) for name, values in arrays.items()]
     cards: Cards = [
         ("NSCALES", len(coefficients.scales), "number of wavelet scales"),
-        ("PARAMS", _json(coefficients.parameters), ""),
+        ("PARAMS", text, ""),
     ]
     return write_hdus(path, images, overwrite=overwrite, cards=[*cards, *provenance()])
 
@@ -98,7 +106,7 @@ def read_coefficients(
     Parameters
     ----------
     path : str or path-like
-        A local file, plain or gzip.
+        A local FITS file, plain or gzip, or a Zarr store.
     max_memory : int, optional
         Bytes the reading may take, 4 GiB by default; checked before any is taken.
 
@@ -110,52 +118,50 @@ def read_coefficients(
     Raises
     ------
     FileFormatError
-        The file holds no wavelet coefficients, or is truncated or damaged.
+        It holds no wavelet coefficients, or is truncated or damaged.
     MemoryBudgetError
         The coefficients need more than `max_memory`.
     ParameterError
         An argument breaks its rule, or `path` is a URL.
+    MissingPackageError
+        zarr is not installed and `path` is a Zarr store.
 
     See Also
     --------
     write_coefficients : The inverse, with an example.
     """
+    if _is_store(path):
+        text, stored = read_store(path, max_memory)
+        parameters = parameters_from_json(Path(path), text)
+        return _assembled(Path(path), stored, len(stored) - 1, parameters)
     with open_guarded(path, None) as file:
         parameters = _parameters(file)
         file.check_memory(2 * sum(unit.size for unit in file.units), max_memory)
         with file.opened("ImageHDU") as images:
             arrays = {image.name: _array(file, image) for image in images}
-        scales = file.keyword("NSCALES", 0)
-        # A file cut between two extensions is still valid FITS: only the count tells.
-        if "SCALING" not in arrays or len(arrays) - 1 != scales:
-            found = f"has the extensions {list(arrays)} where NSCALES = {scales!r}"
-            raise refuse(file.path, found, "give a file that write_coefficients wrote")
-        scaling = arrays.pop("SCALING")
-        wavelets = {_scale(file, name): values for name, values in arrays.items()}
-        return WaveletCoefficients(scaling, wavelets, parameters)
+        return _assembled(file.path, arrays, file.keyword("NSCALES", 0), parameters)
 
 
-def _json(parameters: Mapping[str, Any]) -> str:
-    try:
-        return json.dumps(dict(parameters), allow_nan=False, default=_plain_number)
-    except (TypeError, ValueError) as error:
-        msg = f"parameters={dict(parameters)!r} must be numbers, texts or lists of them ({error})."
-        raise ParameterError(msg) from error
+def _is_store(path: str | os.PathLike[str]) -> bool:
+    return isinstance(path, str | os.PathLike) and os.fspath(path).endswith(".zarr")
 
 
-def _plain_number(value: object) -> object:
-    if isinstance(value, np.generic):
-        return value.item()
-    msg = f"{type(value).__name__} has no JSON form"
-    raise TypeError(msg)
+def _assembled(
+    path: Path, arrays: dict[str, NDArray[Any]], scales: Any, parameters: dict[str, Any]
+) -> WaveletCoefficients:
+    # A file cut between two extensions is still valid FITS: only the count tells.
+    if "SCALING" not in arrays or len(arrays) - 1 != scales:
+        found = f"has the extensions {list(arrays)} where NSCALES = {scales!r}"
+        raise refuse(path, found, _WRITTEN_BY_US)
+    scaling = arrays.pop("SCALING")
+    return WaveletCoefficients(
+        scaling, {_scale(path, name): values for name, values in arrays.items()}, parameters
+    )
 
 
 def _image(name: str, values: NDArray[Any]) -> Any:
     from astropy.io import fits
 
-    if values.dtype not in (np.float64, np.complex128):
-        msg = f"{name.lower()} has dtype {values.dtype} but must be float64 or complex128."
-        raise DataError(msg)
     is_complex = values.dtype.kind == "c"
     image = fits.ImageHDU(np.stack([values.real, values.imag]) if is_complex else values, name=name)
     image.header["PARTS"] = ("COMPLEX" if is_complex else "REAL", "real and imaginary on axis 0")
@@ -164,31 +170,33 @@ def _image(name: str, values: NDArray[Any]) -> Any:
 
 def _parameters(file: GuardedFile) -> dict[str, Any]:
     text = file.keyword("PARAMS", 0)
-    # json raises ValueError on damaged text, which the guard turns into our error.
-    parameters = json.loads(text) if isinstance(text, str) else None
-    if not isinstance(parameters, dict):
-        remedy = "give a file that write_coefficients wrote"
-        raise refuse(file.path, "has no card PARAMS with parameters", remedy)
-    return parameters
+    if not isinstance(text, str):
+        raise refuse(file.path, "has no card PARAMS with parameters", _WRITTEN_BY_US)
+    return parameters_from_json(file.path, text)
 
 
 def _array(file: GuardedFile, hdu: Any) -> NDArray[Any]:
     if hdu.verify_datasum() != 1 or hdu.verify_checksum() != 1:
         raise refuse(file.path, f"fails the checksum of {hdu.name!r}", "fetch the file again")
-    values = np.array(hdu.data, dtype=np.float64)
+    # An empty image has no data at all; float32 stays what it is.
+    kind = {-32: np.float32, -64: np.float64}.get(hdu.header["BITPIX"])
+    if kind is None:
+        found = f"has BITPIX = {hdu.header['BITPIX']} in {hdu.name!r}"
+        raise refuse(file.path, found, _WRITTEN_BY_US)
+    values = np.zeros(hdu.shape, kind) if hdu.data is None else np.array(hdu.data, dtype=kind)
     if hdu.header.get("PARTS") == "REAL":
         return values
     if hdu.header.get("PARTS") != "COMPLEX" or values.shape[:1] != (2,):
         found = f"has no real and imaginary parts in {hdu.name!r}"
-        raise refuse(file.path, found, "give a file that write_coefficients wrote")
-    joined = np.empty(values.shape[1:], dtype=np.complex128)
+        raise refuse(file.path, found, _WRITTEN_BY_US)
+    joined = np.empty(values.shape[1:], dtype=np.result_type(kind, np.complex64))
     joined.real, joined.imag = values
     return joined
 
 
-def _scale(file: GuardedFile, name: str) -> int:
+def _scale(path: Path, name: str) -> int:
     match = _SCALE.fullmatch(name)
     if match is None:
         found = f"has an extension {name!r} where SCALE_j is expected"
-        raise refuse(file.path, found, "give a file that write_coefficients wrote")
+        raise refuse(path, found, _WRITTEN_BY_US)
     return int(match[1])

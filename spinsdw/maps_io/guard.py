@@ -22,7 +22,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-__all__ = ["DEFAULT_MEMORY", "GuardedFile", "HeaderDataUnit", "open_guarded", "refuse"]
+__all__ = [
+    "DEFAULT_MEMORY",
+    "GuardedFile",
+    "HeaderDataUnit",
+    "memory_budget",
+    "open_guarded",
+    "refuse",
+]
 
 DEFAULT_MEMORY = 4 * 2**30
 """The memory budget of a reader, in bytes, where the caller gives none."""
@@ -36,6 +43,15 @@ GZIP_MAGIC = b"\x1f\x8b"
 def refuse(path: object, found: str, remedy: str) -> FileFormatError:
     """Return the error for a file: its name, what was found, what helps."""
     return FileFormatError(f"path={str(path)!r} {found}; {remedy}.")
+
+
+def memory_budget(max_memory: int | None) -> int:
+    """Return the bytes that a reader may take, after checking what the caller gave."""
+    budget = DEFAULT_MEMORY if max_memory is None else max_memory
+    if not isinstance(budget, int) or budget <= 0:
+        msg = f"max_memory={max_memory!r} must be a positive number of bytes, or None for 4 GiB."
+        raise ParameterError(msg)
+    return budget
 
 
 @dataclass(frozen=True)
@@ -71,12 +87,7 @@ class GuardedFile:
 
     def check_memory(self, needed: int, max_memory: int | None) -> None:
         """Raise MemoryBudgetError if ``needed`` bytes and the file expanded exceed the budget."""
-        budget = DEFAULT_MEMORY if max_memory is None else max_memory
-        if not isinstance(budget, int) or budget <= 0:
-            msg = (
-                f"max_memory={max_memory!r} must be a positive number of bytes, or None for 4 GiB."
-            )
-            raise ParameterError(msg)
+        budget = memory_budget(max_memory)
         total = needed + (self.units[-1].end if self.compressed else 0)
         if total > budget:
             msg = (
