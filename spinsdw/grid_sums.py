@@ -32,7 +32,10 @@ _FEWEST_RINGS = 16
 
 @functools.lru_cache(maxsize=64)
 def _engine(sampling: Sampling) -> RingEngine:
-    return RingEngine(sampling.bandlimit, sampling.colatitudes)
+    rings = sampling.colatitudes
+    if sampling.is_symmetric:
+        return RingEngine(sampling.bandlimit, rings[: (rings.size + 1) // 2], symmetric=True)
+    return RingEngine(sampling.bandlimit, rings)
 
 
 def fill_negative_orders(flm: Array) -> None:

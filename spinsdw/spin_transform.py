@@ -35,7 +35,7 @@ class SpinHarmonicTransform:
     spin : int, default 0
         s, of either sign, |s| < L.
     sampling : str or Sampling, default "mw"
-        The grid of the maps: "mw", "mwss" or an object.
+        The grid of the maps: "mw", "mwss", "gl", "cc", "fejer1", "dh" or an object (`sampling`).
     real : bool, default False
         Whether maps are real (spin 0 only): half the work and half the memory.
     threads : int, optional

@@ -27,6 +27,8 @@ Array = np.ndarray[Any, Any]
 
 BANDLIMIT = 8
 NSIDE = 4
+# A grid for each kind of quadrature, with and without mirrored rings.
+SAMPLING_NAMES = ("mw", "mwss", "gl")
 # One direction, an even and an odd number of them: their orders run through different branches.
 DIRECTIONS = (1, 2, 3)
 
@@ -71,7 +73,7 @@ def warm_up(threads: int | None = None) -> dict[str, float]:
 
 
 def _spin_transforms(threads: int | None) -> None:
-    for sampling in ("mw", "mwss"):
+    for sampling in SAMPLING_NAMES:
         make = partial(SpinHarmonicTransform, BANDLIMIT, sampling=sampling, threads=threads)
         for transform in (make(0), make(0, real=True), make(2), make(-2)):
             maps = transform.synthesis(np.zeros(BANDLIMIT**2, dtype=np.complex128))
@@ -80,7 +82,7 @@ def _spin_transforms(threads: int | None) -> None:
 
 
 def _wigner_transforms(threads: int | None) -> None:
-    for sampling in ("mw", "mwss"):
+    for sampling in SAMPLING_NAMES:
         for orders, real in (((0,), True), ((-1, 1), True), ((-2, 0, 2), False), ((1, 2), False)):
             transform = WignerTransform(
                 BANDLIMIT, orders, sampling=sampling, real=real, threads=threads
@@ -92,7 +94,7 @@ def _wigner_transforms(threads: int | None) -> None:
 
 
 def _wavelet_transforms(threads: int | None) -> None:
-    for sampling in ("mw", "mwss"):
+    for sampling in SAMPLING_NAMES:
         for directions in DIRECTIONS:
             for spin, real in ((0, False), (0, True), (2, False)):
                 transform = SpinWaveletTransform(

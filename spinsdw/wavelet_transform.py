@@ -96,7 +96,8 @@ class SpinWaveletTransform:
     lowest_scale : int, default 0
         J0: larger structures belong to the scaling part. Not with ``tiling``.
     sampling : str or Sampling, default "mw"
-        Grid of maps; every scale uses the same kind at its own bandlimit.
+        Grid of maps, as in `SpinHarmonicTransform`; every scale uses the same kind at its own
+        bandlimit.
     multiresolution : bool, default True
         Whether scale j is sampled at its own bandlimit, or at L.
     real : bool, default False

@@ -51,7 +51,7 @@ class WignerTransform:
     orders : sequence of int
         The orders n present, increasing, |n| < L.
     sampling : str or Sampling, default "mw"
-        Grid in (beta, alpha).
+        Grid in (beta, alpha), as in `SpinHarmonicTransform`.
     real : bool, default False
         Whether functions are real; the orders must then be symmetric about 0.
     threads : int, optional

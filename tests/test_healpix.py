@@ -41,6 +41,7 @@ from spinsdw.healpix import (
     upgrade_map,
 )
 from spinsdw.masks import galactic_cut
+from spinsdw.sampling import SAMPLINGS
 from spinsdw.spin_transform import SpinHarmonicTransform
 from tests.helpers import EPS, assert_close, random_flm
 
@@ -527,7 +528,7 @@ def test_synthesis_of_real_fields_refuses_others():
         flm_to_map(random_flm(4), 4, real=True)
 
 
-@pytest.mark.parametrize("sampling", ["mw", "mwss"])
+@pytest.mark.parametrize("sampling", SAMPLINGS)
 @pytest.mark.parametrize("spin", [0, 2])
 def test_grid_maps_go_to_healpix_and_back(sampling, spin):
     nside, bandlimit = 8, 9

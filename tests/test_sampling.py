@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import FrozenInstanceError
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from spinsdw.errors import ParameterError
-from spinsdw.sampling import MW, MWSS, HealpixRings, Sampling, resolve_sampling
-from tests.helpers import assert_close, random_like, small_d
+from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.sampling import (
+    MW,
+    MWSS,
+    SAMPLINGS,
+    ClenshawCurtis,
+    DriscollHealy,
+    Fejer1,
+    GaussLegendre,
+    HealpixRings,
+    Sampling,
+    resolve_sampling,
+)
+from spinsdw.sampling.weighted import WeightedRings
+from tests.helpers import assert_close, needs_compiler, random_like, sizes, small_d
 
-GRIDS = [MW, MWSS]
+GRIDS = list(SAMPLINGS.values())
 BANDLIMITS = [1, 2, 3, 4, 9]
 
 
@@ -42,6 +55,118 @@ def test_mwss_rings_are_multiples_of_a_step_from_pole_to_pole(bandlimit):
     assert_close(grid.longitudes, np.arange(2 * bandlimit) * step, ulps=2)
     assert grid.colatitudes[0] == 0
     assert grid.colatitudes[-1] == np.pi
+
+
+@pytest.mark.parametrize("bandlimit", BANDLIMITS)
+def test_other_uniform_rings_stand_where_their_rules_say(bandlimit):
+    """DH (2t + 1) pi / 4L, Fejer (2t + 1) pi / (4L - 2), Clenshaw-Curtis pi t / (2L - 2)."""
+    size = 2 * bandlimit - 1
+    for grid, rings, step, start in (
+        (DriscollHealy, 2 * bandlimit, np.pi / (2 * bandlimit), 0.5),
+        (Fejer1, size, np.pi / size, 0.5),
+        (ClenshawCurtis, max(size, 2), np.pi / max(size - 1, 1), 0.0),
+    ):
+        assert grid(bandlimit).shape == (rings, size)
+        assert_close(grid(bandlimit).colatitudes, (np.arange(rings) + start) * step, ulps=2)
+
+
+@pytest.mark.parametrize("bandlimit", [1, 2, 3, 10, 65])
+def test_gauss_legendre_rings_are_zeros_of_the_legendre_polynomial(bandlimit):
+    """cos(theta_t) and the weights are those of numpy, found as eigenvalues."""
+    grid = GaussLegendre(bandlimit)
+    nodes, weights = np.polynomial.legendre.leggauss(bandlimit)
+    assert grid.shape == (bandlimit, 2 * bandlimit - 1)
+    np.testing.assert_allclose(np.cos(grid.colatitudes), nodes[::-1], rtol=0, atol=4e-16)
+    assert_close(grid.weights * grid.n_phi / (2 * np.pi), weights[::-1], ulps=8 * bandlimit)
+
+
+@needs_compiler
+@pytest.mark.parametrize("bandlimit", [1024, 4096])
+def test_gauss_legendre_rings_near_a_pole_keep_their_digits(bandlimit):
+    """theta_t = j_t / (L + 1/2) (1 - (1 - j_t cot j_t ..) ..): Bessel zeros, to O(L^-4)."""
+    first = GaussLegendre(bandlimit).colatitudes[0]
+    zero, scale = 2.404825557695773, bandlimit + 0.5
+    rough = zero / scale
+    desired = rough + (rough / np.tan(rough) - 1) / (8 * rough * scale**2)
+    assert abs(first - desired) < rough * (1e-15 + bandlimit**-4.0)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("bandlimit", sizes(*BANDLIMITS, 64, 515))
+def test_weighted_sums_are_integrals(grid, bandlimit):
+    """sum_t w_t P sum P_l(cos theta_t) = 4 pi delta_l0 for l < integral_bandlimit."""
+    sampling = grid(bandlimit)
+    cosine = np.cos(sampling.colatitudes)
+    weights = sampling.weights * sampling.n_phi
+    before, now = np.zeros_like(cosine), np.ones_like(cosine)
+    sums = []
+    for el in range(sampling.integral_bandlimit):
+        sums.append(weights @ now)
+        before, now = now, ((2 * el + 1) * cosine * now - el * before) / (el + 1)
+    desired = np.zeros(sampling.integral_bandlimit)
+    desired[0] = 4 * np.pi
+    assert_close(sums, desired, ulps=4 * bandlimit)
+    assert np.all(weights > 0) or not isinstance(sampling, WeightedRings)
+    assert not sampling.weights.flags.writeable
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("bandlimit", [2, 3, 6, 9])
+def test_integral_bandlimit_is_the_largest(grid, bandlimit):
+    """One degree more, in theta or in phi, and a weighted sum is no integral."""
+    sampling = grid(bandlimit)
+    degree = sampling.integral_bandlimit
+    theta, phi = sampling.points
+    if degree == sampling.n_phi:
+        values = np.cos(degree * phi) * np.sin(theta) ** degree
+    else:
+        values = np.polynomial.Legendre.basis(degree)(np.cos(theta))
+    assert abs(sampling.integrate(values)) > 1e-3
+
+
+@pytest.mark.parametrize("bandlimit", BANDLIMITS)
+def test_driscoll_healy_weights_are_those_of_the_paper(bandlimit):
+    """w_t = (2 / L) sin(theta_t) sum_{k < L} sin((2k + 1) theta_t) / (2k + 1)."""
+    grid = DriscollHealy(bandlimit)
+    odd = 2 * np.arange(bandlimit) + 1
+    theta = grid.colatitudes
+    sums = np.sin(np.outer(theta, odd)) @ (1 / odd)
+    desired = 2 / bandlimit * np.sin(theta) * sums * 2 * np.pi / grid.n_phi
+    assert_close(grid.weights, desired, ulps=16)
+
+
+def test_simpson_is_the_clenshaw_curtis_rule_of_three_rings():
+    """1/3, 4/3, 1/3."""
+    weights = ClenshawCurtis(2).weights * 3 / (2 * np.pi)
+    assert_close(weights, [float(Fraction(k, 3)) for k in (1, 4, 1)], ulps=4)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_points_are_the_colatitude_and_longitude_of_each_sample(grid):
+    sampling = grid(5)
+    theta, phi = sampling.points
+    assert theta.shape == phi.shape == sampling.shape
+    assert np.array_equal(theta[:, 0], sampling.colatitudes)
+    assert np.array_equal(phi[0], sampling.longitudes)
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_integrals_take_a_batch(grid):
+    """int Y_00 sqrt(4 pi) = 4 pi."""
+    sampling = grid(4)
+    values = np.multiply.outer([1.0, 2.0], np.ones(sampling.shape))
+    assert_close(sampling.integrate(values), [4 * np.pi, 8 * np.pi], ulps=8)
+    with pytest.raises(ShapeError, match="its last two axes must be"):
+        sampling.integrate(np.ones(sampling.n_rings))
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_symmetric_grids_mirror_their_rings(grid):
+    theta = grid(9).colatitudes
+    if grid.is_symmetric:
+        assert_close(np.pi - theta[::-1], theta, ulps=2)
+    else:
+        assert abs(np.pi - theta[-1] - theta[0]) > 0.1
 
 
 @pytest.mark.parametrize("grid", GRIDS)
@@ -112,7 +237,9 @@ def test_quadrature_has_the_same_bits_on_any_number_of_threads(grid, threads):
     assert np.array_equal(one, several)
 
 
-@pytest.mark.parametrize(("name", "grid"), [("mw", MW), ("MW", MW), ("mwss", MWSS), ("MwSS", MWSS)])
+@pytest.mark.parametrize(
+    ("name", "grid"), [*SAMPLINGS.items(), ("MW", MW), ("MwSS", MWSS), ("GL", GaussLegendre)]
+)
 def test_name_means_its_grid(name, grid):
     assert resolve_sampling(name, 5) == grid(5)
     assert resolve_sampling(grid(5), 5) == grid(5)
@@ -128,11 +255,11 @@ def test_grids_are_equal_by_value_and_frozen(grid):
 
 
 def test_kinds_of_grid_differ():
-    assert MW(4) != MWSS(4)
-    assert (MW.name, MWSS.name) == ("mw", "mwss")
+    assert len({grid(4) for grid in GRIDS}) == len(GRIDS)
+    assert list(SAMPLINGS) == ["mw", "mwss", "dh", "gl", "cc", "fejer1"]
 
 
-@pytest.mark.parametrize("name", ["gl", "", "mw ", None, 3, MW])
+@pytest.mark.parametrize("name", ["hpx", "", "mw ", None, 3, MW])
 def test_unknown_name_lists_those_known(name):
     with pytest.raises(ParameterError, match=r"sampling=.* is not known; use one of 'mw', 'mwss'"):
         resolve_sampling(name, 4)

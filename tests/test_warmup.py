@@ -17,6 +17,7 @@ import numpy as np
 from spinsdw.healpix import flm_to_map, healpix_to_mw, map_to_flm, mw_to_healpix
 from spinsdw.masks import galactic_cut
 from spinsdw.polarisation import EBSeparator
+from spinsdw.sampling import SAMPLINGS
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wigner_transform import WignerTransform
@@ -27,7 +28,7 @@ def around(transform, coefficients):
     transform.adjoint_analysis(transform.analysis(values))
     transform.adjoint_synthesis(values)
 
-for sampling in ("mw", "mwss"):
+for sampling in SAMPLINGS:
     for spin, real in ((0, True), (0, False), (1, False), (-3, False)):
         around(
             SpinHarmonicTransform(L, spin, sampling=sampling, real=real, threads=3),
@@ -49,6 +50,8 @@ for sampling in ("mw", "mwss"):
             wavelets.synthesis(found)
             wavelets.adjoint_analysis(found)
             wavelets.adjoint_synthesis(maps)
+    if sampling not in ("mw", "mwss"):
+        continue
     q = np.zeros(SpinHarmonicTransform(L, 2, sampling=sampling).shape)
     mask = np.ones_like(q)
     mask[8:10] = 0

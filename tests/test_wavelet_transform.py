@@ -15,7 +15,7 @@ from spinsdw.compiled import order_sums
 from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.maps_io import read_coefficients, write_coefficients
 from spinsdw.ring_transform import HealpixTransform
-from spinsdw.sampling import MW, MWSS
+from spinsdw.sampling import MW, MWSS, SAMPLINGS
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import (
     CustomTiling,
@@ -64,6 +64,11 @@ SMALL = [
     (8, 0, 8, {"real": True}),
     (8, 0, 3, {"real": True, "multiresolution": False}),
 ]
+SMALL += [
+    (8, spin, directions, {"sampling": sampling, "real": spin == 0})
+    for sampling in SAMPLINGS
+    for spin, directions in ((0, 2), (-2, 3))
+]
 LARGE = [
     (64, spin, directions, {"lowest_scale": lowest_scale})
     for spin in (0, 2, -3, 5)
@@ -81,6 +86,7 @@ LARGE += [
     (33, -4, 33, {"sampling": "mwss", "lowest_scale": 1}),
     (64, 2, 2, {"multiresolution": False}),
     (64, -3, 5, {"multiresolution": False, "sampling": "mwss"}),
+    (65, 2, 3, {"sampling": "gl"}),
     (64, 0, 1, {"real": True}),
     (64, 0, 4, {"real": True, "sampling": "mwss"}),
     (64, 0, 5, {"real": True, "multiresolution": False, "lowest_scale": 2}),
@@ -590,7 +596,7 @@ def test_signals_with_spin_are_not_real():
         SpinWaveletTransform(8, 2, real=True)
 
 
-@pytest.mark.parametrize("sampling", ["gl", 3, MW(9)])
+@pytest.mark.parametrize("sampling", ["hpx", 3, MW(9)])
 def test_sampling_is_known_and_has_the_same_bandlimit(sampling):
     with pytest.raises(ParameterError, match="sampling"):
         SpinWaveletTransform(8, sampling=sampling)

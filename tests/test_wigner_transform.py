@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
-from spinsdw.sampling import MW, MWSS
+from spinsdw.sampling import MW, MWSS, SAMPLINGS
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wigner_transform import WignerTransform
 from tests.helpers import (
@@ -23,7 +23,7 @@ from tests.helpers import (
     relative_error,
 )
 
-GRIDS = ["mw", "mwss"]
+GRIDS = list(SAMPLINGS)
 ORDERS = [
     (1, (0,)),
     (2, (-1, 0, 1)),
@@ -329,7 +329,7 @@ def test_threads_are_a_positive_integer(threads):
         WignerTransform(4, (0,), threads=threads)
 
 
-@pytest.mark.parametrize("sampling", ["gl", MW(5)])
+@pytest.mark.parametrize("sampling", ["hpx", MW(5)])
 def test_sampling_is_known_and_has_the_same_bandlimit(sampling):
     with pytest.raises(ParameterError, match="sampling"):
         WignerTransform(4, (0,), sampling=sampling)

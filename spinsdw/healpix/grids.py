@@ -86,7 +86,7 @@ def mw_to_healpix(
     nside: int,
     spin: int = 0,
     *,
-    sampling: str = "mw",
+    sampling: str | Sampling = "mw",
     threads: int | None = None,
 ) -> NDArray[Any]:
     """Evaluate maps of an exact grid at HEALPix pixel centres, through their coefficients.
@@ -101,8 +101,8 @@ def mw_to_healpix(
         HEALPix resolution.
     spin : int
         Spin weight.
-    sampling : {"mw", "mwss"}
-        The grid of the maps.
+    sampling : str or Sampling
+        The grid of the maps: a name that `resolve_sampling` knows, or an object.
     threads : int, optional
         Threads of the transforms.
 
@@ -134,7 +134,8 @@ def mw_to_healpix(
     if isinstance(sampling, Sampling):
         bandlimit = sampling.bandlimit
     else:
-        bandlimit = values.shape[-2] - (sampling == "mwss")
+        # 2 L - 1 points a ring, 2 L on MWSS.
+        bandlimit = (values.shape[-1] + 1) // 2
     grid = SpinHarmonicTransform(bandlimit, spin, sampling=sampling, real=is_real, threads=threads)
     return flm_to_map(grid.analysis(values), nside, spin, real=is_real, threads=threads)
 
@@ -153,7 +154,7 @@ def healpix_to_mw(
     bandlimit: int,
     spin: int = 0,
     *,
-    sampling: str = "mw",
+    sampling: str | Sampling = "mw",
     mask: ArrayLike | None = None,
     **options: Unpack[FitOptions],
 ) -> tuple[NDArray[Any], HealpixFit]:
@@ -169,7 +170,7 @@ def healpix_to_mw(
         One more than the largest degree, up to 3 nside.
     spin : int
         Spin weight.
-    sampling : {"mw", "mwss"}
+    sampling : str or Sampling
         The grid wanted.
     mask : array_like, shape (npix,), optional
         Weights in [0, 1].

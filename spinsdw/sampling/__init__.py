@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.equiangular import MW, MWSS
+from spinsdw.sampling.gauss_legendre import GaussLegendre
 from spinsdw.sampling.healpix_rings import HealpixRings
-from spinsdw.sampling.names import resolve_sampling
+from spinsdw.sampling.names import SAMPLINGS, resolve_sampling
+from spinsdw.sampling.uniform_rings import ClenshawCurtis, DriscollHealy, Fejer1
 
-__all__ = ["MW", "MWSS", "HealpixRings", "Sampling", "resolve_sampling"]
+__all__ = [
+    "MW",
+    "MWSS",
+    "SAMPLINGS",
+    "ClenshawCurtis",
+    "DriscollHealy",
+    "Fejer1",
+    "GaussLegendre",
+    "HealpixRings",
+    "Sampling",
+    "resolve_sampling",
+]

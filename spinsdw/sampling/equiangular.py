@@ -65,7 +65,16 @@ class _Equiangular(Sampling):
         return 2 * self.bandlimit - self._offset
 
     @functools.cached_property
-    def _weights(self) -> tuple[Array, Array]:
+    def weights(self) -> Array:
+        """Weight of each point of a ring; float64, shape (n_rings,): the quadrature of d^0_00."""
+        columns = np.ones((1, 1, self.n_rings), dtype=np.complex128)
+        self.weigh_columns(columns, (0,), mixing=np.ones((1, 1), dtype=complex), threads=1)
+        weights = columns[0, 0].real.copy()
+        weights.flags.writeable = False
+        return weights
+
+    @functools.cached_property
+    def _circle_weights(self) -> tuple[Array, Array]:
         size = self.n_phi
         here, between = _sine_weights(self.bandlimit, size, float(self.colatitudes[0]))
         # 2 pi / P of the ring sums, pi / C of the circle, 1 / 2 of the two grids.
@@ -78,7 +87,7 @@ class _Equiangular(Sampling):
 
     def _project(self, circles: Array) -> None:
         """Replace circles by (w_A + S^T w_B S) circles, times the constants."""
-        here, between = self._weights
+        here, between = self._circle_weights
         shifted = self._half_step.shift(circles)
         shifted *= between
         circles *= here
@@ -143,6 +152,11 @@ class MW(_Equiangular):
         return self.bandlimit
 
     @property
+    def integral_bandlimit(self) -> int:
+        """L: a weighted sum over L rings does not integrate the product of two signals."""
+        return self.bandlimit
+
+    @property
     def colatitudes(self) -> Array:
         """Colatitude of each ring in radians; float64, shape (n_rings,)."""
         return (2 * np.arange(self.bandlimit) + 1) * np.pi / (2 * self.bandlimit - 1)
@@ -166,12 +180,18 @@ class MWSS(_Equiangular):
     """
 
     name: ClassVar[str] = "mwss"
+    is_symmetric: ClassVar[bool] = True
     _offset: ClassVar[int] = 0
 
     @property
     def n_rings(self) -> int:
         """Number of rings, L + 1."""
         return self.bandlimit + 1
+
+    @property
+    def integral_bandlimit(self) -> int:
+        """L + 1, or L + 2 for even L: that of Clenshaw and Curtis with L + 1 rings."""
+        return self.bandlimit + 2 - self.bandlimit % 2
 
     @property
     def colatitudes(self) -> Array:

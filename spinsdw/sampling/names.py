@@ -5,10 +5,14 @@ from __future__ import annotations
 from spinsdw.errors import ParameterError
 from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.equiangular import MW, MWSS
+from spinsdw.sampling.gauss_legendre import GaussLegendre
+from spinsdw.sampling.uniform_rings import ClenshawCurtis, DriscollHealy, Fejer1
 
-__all__ = ["resolve_sampling"]
+__all__ = ["SAMPLINGS", "resolve_sampling"]
 
-_KNOWN: dict[str, type[Sampling]] = {kind.name: kind for kind in (MW, MWSS)}
+SAMPLINGS: dict[str, type[Sampling]] = {
+    kind.name: kind for kind in (MW, MWSS, DriscollHealy, GaussLegendre, ClenshawCurtis, Fejer1)
+}
 
 
 def resolve_sampling(sampling: str | Sampling, bandlimit: int) -> Sampling:
@@ -17,7 +21,7 @@ def resolve_sampling(sampling: str | Sampling, bandlimit: int) -> Sampling:
     Parameters
     ----------
     sampling : str or Sampling
-        "mw", "mwss" or an object.
+        "mw", "mwss", "dh", "gl", "cc", "fejer1" or an object.
     bandlimit : int
         What the object must have, or is made with.
 
@@ -44,8 +48,8 @@ def resolve_sampling(sampling: str | Sampling, bandlimit: int) -> Sampling:
             )
             raise ParameterError(msg)
         return sampling
-    if not isinstance(sampling, str) or sampling.lower() not in _KNOWN:
-        names = ", ".join(repr(name) for name in _KNOWN)
+    if not isinstance(sampling, str) or sampling.lower() not in SAMPLINGS:
+        names = ", ".join(repr(name) for name in SAMPLINGS)
         msg = f"sampling={sampling!r} is not known; use one of {names} or a Sampling object."
         raise ParameterError(msg)
-    return _KNOWN[sampling.lower()](bandlimit)
+    return SAMPLINGS[sampling.lower()](bandlimit)
