@@ -35,7 +35,7 @@ LAYERS = (  # bottom to top
     {"wavelet_transform"},
     {"energy"},
     {"healpix"},
-    {"masks"},
+    {"masks", "footprints"},
     {"maps_io"},
     {"simulation"},
     {"separation"},
