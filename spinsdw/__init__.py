@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from spinsdw.coefficients import WaveletCoefficients
-    from spinsdw.directionality import Directionality
+    from spinsdw.directionality import (
+        CurveletDirectionality,
+        RidgeletDirectionality,
+        SteerableDirectionality,
+    )
     from spinsdw.polarisation import EBMaps, EBSeparator
     from spinsdw.spin_transform import SpinHarmonicTransform
     from spinsdw.tiling import ScaleDiscretisedTiling
@@ -21,12 +25,14 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
-    "Directionality",
+    "CurveletDirectionality",
     "EBMaps",
     "EBSeparator",
+    "RidgeletDirectionality",
     "ScaleDiscretisedTiling",
     "SpinHarmonicTransform",
     "SpinWaveletTransform",
+    "SteerableDirectionality",
     "WaveletCoefficients",
     "Wavelets",
     "WignerTransform",
@@ -34,12 +40,14 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Directionality": "spinsdw.directionality",
+    "CurveletDirectionality": "spinsdw.directionality",
     "EBMaps": "spinsdw.polarisation",
     "EBSeparator": "spinsdw.polarisation",
+    "RidgeletDirectionality": "spinsdw.directionality",
     "ScaleDiscretisedTiling": "spinsdw.tiling",
     "SpinHarmonicTransform": "spinsdw.spin_transform",
     "SpinWaveletTransform": "spinsdw.wavelet_transform",
+    "SteerableDirectionality": "spinsdw.directionality",
     "WaveletCoefficients": "spinsdw.coefficients",
     "Wavelets": "spinsdw.wavelets",
     "WignerTransform": "spinsdw.wigner_transform",

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from spinsdw.directionality import Directionality
+from spinsdw.directionality import Orientations
 from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.signals import refuse_masked
 
@@ -79,10 +79,13 @@ class WaveletCoefficients:
     scaling : ndarray, shape (..., rings, phi)
         Scaling coefficients, a scalar field.
     wavelets : mapping of int to ndarray, shape (..., directions, rings, phi)
-        Coefficients of each scale j at orientations k pi / N.
+        Coefficients of each scale j at orientations k pi / N. Of curvelets a scale has
+        orientations of its own, fewer the coarser it is.
     parameters : mapping
         What made them: bandlimit, spin, directions, dilation, lowest_scale, sampling,
-        multiresolution, real; and tiling, a text, where that is of another kind.
+        multiresolution, real; tiling and directionality, texts, where these are of another kind,
+        the latter with order_step, the distance of its orders; and original_spin, where there is
+        one.
 
     Raises
     ------
@@ -122,15 +125,22 @@ class WaveletCoefficients:
         self._scaling = _held(scaling, "scaling part")
         self._wavelets = {int(j): _held(wavelets[j], f"scale {j}") for j in sorted(wavelets)}
         self._parameters = MappingProxyType(dict(parameters))
-        directions = self._parameters.get("directions")
         for j, values in self._wavelets.items():
             batch_agrees = values.shape[:-3] == self._scaling.shape[:-2]
-            if values.ndim < 3 or values.shape[-3] != directions or not batch_agrees:
+            if values.ndim < 3 or not self._may_have(values.shape[-3]) or not batch_agrees:
+                directions = self._parameters.get("directions")
                 msg = (
                     f"scale {j} has shape {values.shape}; it must be (..., {directions}, rings, "
                     f"phi) with the batch of the scaling part, {self._scaling.shape[:-2]}."
                 )
                 raise ShapeError(msg)
+
+    def _may_have(self, orientations: int) -> bool:
+        """Tell whether a scale can have so many: of curvelets the coarser ones have fewer."""
+        directions: Any = self._parameters.get("directions")
+        if "directionality" in self._parameters:
+            return 1 <= orientations <= directions and orientations % 2 == directions % 2
+        return orientations == directions
 
     # Built anew from its parts: the mapping of the parameters cannot be pickled itself.
     def __reduce__(self) -> tuple[Any, ...]:
@@ -420,7 +430,12 @@ class WaveletCoefficients:
         if np.ndim(angle) != 0 or np.asarray(angle).dtype.kind not in "iuf":
             msg = f"angle={angle!r} must be one real number, in radians; steer once for each."
             raise ParameterError(msg)
-        weights = Directionality(self._parameters["directions"]).steering_weights(angle)
+        step = self._parameters.get("order_step", 2)
         return {
-            j: np.einsum("k,...ktp->...tp", weights, values) for j, values in self._wavelets.items()
+            j: np.einsum(
+                "k,...ktp->...tp",
+                Orientations(values.shape[-3], step).steering_weights(angle),
+                values,
+            )
+            for j, values in self._wavelets.items()
         }

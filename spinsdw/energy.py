@@ -16,7 +16,7 @@ import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import ShapeError
-from spinsdw.fourier import fill_maps_columns
+from spinsdw.fourier import fill_maps_columns, to_orders
 from spinsdw.sampling import Sampling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -42,19 +42,26 @@ def _copies(grid: Sampling, n_m: int) -> Array:
     return copies
 
 
-def _integrate(first: Array, second: Array, grid: Sampling, parity: int) -> Array:
+def _integrate(first: Array, second: Array, grid: Sampling, orders: tuple[int, ...]) -> Array:
     """Return the integral over the sphere of first * conj(second) for each of the maps.
 
     ``first``, ``second``: shape (maps, rings, phi), both real or both complex, whose Fourier
-    columns have parity (-1)^(m + parity) in theta.
+    columns have parity (-1)^(m + n) in theta, n the order of each.
     """
     left = _columns(first, grid)
     right = left.copy() if second is first else _columns(second, grid)
     identity = np.eye(len(first), dtype=np.complex128)
-    grid.weigh_columns(left, (parity,) * len(first), mixing=identity, threads=1)
+    grid.weigh_columns(left, orders, mixing=identity, threads=1)
     copies = _copies(grid, left.shape[1]) / grid.n_phi
     found = np.einsum("kmt,kmt,m->k", left, right.conj(), copies)
     return found if np.iscomplexobj(first) else found.real
+
+
+def _by_order(maps: Array) -> Array:
+    """Return maps by order 0, 1, ..., -1 from maps by orientation: a unitary transform."""
+    spectrum = maps.astype(np.complex128)
+    to_orders(spectrum, spectrum)
+    return spectrum / np.sqrt(len(maps))
 
 
 def _products(one: Array, other: Array, transform: SpinWaveletTransform, key: int | str) -> Array:
@@ -63,15 +70,25 @@ def _products(one: Array, other: Array, transform: SpinWaveletTransform, key: in
     tiling = transform.wavelets.tiling
     size = tiling.scaling_bandlimit if is_scaling else tiling.scale_bandlimit(int(key))
     grid = transform.grid_of(size)
-    parity = 0 if is_scaling else transform.wavelets.directionality.orders[0] % 2
+    step: int = 2
+    orders: tuple[int, ...] = (0,)
+    if not is_scaling:
+        orientations = transform.wavelets.orientations_of(int(key))
+        step, orders = orientations.step, (orientations.largest_order,) * orientations.count
+    if step == 1:
+        orders = (*range(len(orders) // 2 + 1), *range(-(len(orders) // 2), 0))
     rows = one.reshape(-1, *transform.shapes[key]), other.reshape(-1, *transform.shapes[key])
     found = np.empty(one.shape[:-2], dtype=one.dtype)
-    products = found.reshape(len(rows[0]), 1 if is_scaling else transform.directions)
+    products = found.reshape(len(rows[0]), len(orders))
     for product, first, second in zip(products, *rows, strict=True):
         maps = first.reshape(-1, *grid.shape)
         others = maps if other is one else second.reshape(-1, *grid.shape)
-        product[...] = _integrate(maps, others, grid, parity)
-    return found if is_scaling else found * (2 * np.pi / transform.directions)
+        if step == 1:
+            maps = _by_order(maps)
+            others = maps if other is one else _by_order(others)
+        values = _integrate(maps, others, grid, orders)
+        product[...] = values if np.iscomplexobj(found) else values.real
+    return found if is_scaling else found * (2 * np.pi / len(orders))
 
 
 def _all_products(
@@ -108,7 +125,9 @@ def energies(
     dict
         "scaling" -> shape (...), j -> shape (..., directions), float64, the square of the
         signal's unit; leading axes are the batch. An orientation is counted from the meridian, so
-        its share depends on the frame; the sum over orientations does not.
+        its share depends on the frame; the sum over orientations does not. Of curvelets that are
+        not centred, whose orientations no quadrature keeps apart, it is the energy of each order
+        n = 0, 1, ..., -1 instead: the sum is the same.
 
     Raises
     ------

@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["fill_maps", "fill_maps_columns", "from_series", "to_series"]
+__all__ = [
+    "fill_maps",
+    "fill_maps_columns",
+    "from_orders",
+    "from_series",
+    "to_orders",
+    "to_series",
+]
 
 Array = np.ndarray[Any, Any]
 
@@ -39,6 +46,16 @@ def fill_maps(columns: Array, maps: Array) -> None:
 def fill_maps_columns(maps: Array, columns: Array) -> None:
     """Fill ``columns[..., m, ring] = sum_p maps[..., ring, p] exp(-2 pi i m p / P)``."""
     _forward(np.swapaxes(maps, -1, -2), columns, maps.ndim - 2)
+
+
+def from_orders(spectrum: Array, out: Array) -> None:
+    """Fill ``out[k, ...] = sum_n spectrum[n, ...] exp(2 pi i n k / K)``; as `from_series`."""
+    _backward(spectrum, out, 0)
+
+
+def to_orders(values: Array, out: Array) -> None:
+    """Fill ``out[n, ...] = sum_k values[k, ...] exp(-2 pi i n k / K)``; as `to_series`."""
+    _forward(values, out, 0)
 
 
 def _backward(series: Array, out: Array, axis: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import warnings
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
@@ -11,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
-from spinsdw.directionality import Directionality
-from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.directionality import Directionality, Orientations, SteerableDirectionality
+from spinsdw.errors import ParameterError, PrecisionWarning, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm
+from spinsdw.orientation_sums import OrientationSums
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, writable
@@ -29,6 +31,9 @@ Array = np.ndarray[Any, Any]
 # What coefficients may differ in from the transform that takes them: E and B are the parts of a
 # spin-2 analysis, and a scalar, maybe real, synthesis follows. Values are checked for being real.
 _FREE = {"spin", "real"}
+
+# With more orders a Fourier transform mixes them into orientations faster than a matrix.
+_MOST_MIXED_ORDERS = 32
 
 
 def _resolve_tiling(
@@ -54,6 +59,20 @@ def _resolve_tiling(
         )
         raise ParameterError(msg)
     return tiling
+
+
+def _resolve_directionality(
+    directionality: Directionality | None, directions: int | None
+) -> Directionality:
+    if directionality is None:
+        return SteerableDirectionality(1 if directions is None else directions)
+    if directions is not None:
+        msg = (
+            f"directions={directions!r} cannot be given with a directionality, which has its own; "
+            "drop one."
+        )
+        raise ParameterError(msg)
+    return directionality
 
 
 def _digest(*arrays: Array) -> str:
@@ -90,7 +109,7 @@ class SpinWaveletTransform:
     spin : int, default 0
         s of the signal, |s| < L.
     directions : int, default 1
-        N, the azimuthal bandlimit: 1 is axisymmetric; N <= L.
+        N, the azimuthal bandlimit: 1 is axisymmetric; N <= L. Not with ``directionality``.
     dilation : float, default 2.0
         lambda > 1: scale j has degrees lambda^(j-1) < l < lambda^(j+1). Not with ``tiling``.
     lowest_scale : int, default 0
@@ -105,13 +124,21 @@ class SpinWaveletTransform:
     tiling : Tiling, optional
         Kernels to use instead of the scale-discretised ones of ``dilation`` and ``lowest_scale``,
         which then tell the tiling's own (2.0 where it has no dilation).
+    directionality : Directionality, optional
+        Curvelets, ridgelets or another azimuthal part, instead of the steerable one of
+        ``directions``, which then tells how many orientations the finest scale has.
+    original_spin : int, default 0
+        r of eq-spin-lowered: `analysis` takes wavelets lowered from spin r, and `synthesis` those
+        of -r, its inverse. S2LET synthesises with the same r: that is a transform of -r.
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
 
     Notes
     -----
     Cost O(N L^3). `synthesis` inverts `analysis` for band-limited signals to rounding. The adjoints
-    are those of the plain dot product of the stored arrays.
+    are those of the plain dot product of the stored arrays. Degrees that the wavelets do not hold
+    (``wavelets.lost_degrees``: of ridgelets every other one) do not come back; an analysis of a
+    signal that has some gives a `PrecisionWarning`.
 
     Examples
     --------
@@ -134,13 +161,15 @@ class SpinWaveletTransform:
     multiresolution: bool = True
     real: bool = False
     tiling: Tiling | None = None
+    directionality: Directionality | None = None
+    original_spin: int = 0
     threads: int | None = None
 
     def __init__(  # noqa: PLR0913 - the parameters of the wavelets
         self,
         bandlimit: int,
         spin: int = 0,
-        directions: int = 1,
+        directions: int | None = None,
         *,
         dilation: float | None = None,
         lowest_scale: int | None = None,
@@ -148,24 +177,33 @@ class SpinWaveletTransform:
         multiresolution: bool = True,
         real: bool = False,
         tiling: Tiling | None = None,
+        directionality: Directionality | None = None,
+        original_spin: int = 0,
         threads: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         grid = resolve_sampling(sampling, bandlimit)
         tiling = _resolve_tiling(tiling, bandlimit, dilation, lowest_scale)
-        wavelets = Wavelets(tiling, Directionality(directions), spin)
+        wavelets = Wavelets(
+            tiling,
+            _resolve_directionality(directionality, directions),
+            spin,
+            original_spin=original_spin,
+        )
         # Checks spin, real and threads.
         harmonic = SpinHarmonicTransform(bandlimit, spin, sampling=grid, real=real, threads=threads)
         values = (
             bandlimit,
             harmonic.spin,
-            int(directions),
+            wavelets.directionality.orientations_at(bandlimit).count,
             float(getattr(tiling, "dilation", 2.0)),
             tiling.lowest_scale,
             grid,
             check_flag(multiresolution, "multiresolution"),
             harmonic.real,
             tiling,
+            wavelets.directionality,
+            wavelets.original_spin,
             threads,
         )
         for field, value in zip(fields(self), values, strict=True):
@@ -195,8 +233,11 @@ class SpinWaveletTransform:
 
     @property
     def orientations(self) -> Array:
-        """The orientations gamma_k = k pi / N in radians; float64, shape (directions,)."""
-        return self.wavelets.directionality.orientations
+        """The orientations gamma_k, k pi / N, in radians; float64, shape (directions,).
+
+        Of curvelets those of the finest scale, and `Wavelets.orientations_of` tells the others.
+        """
+        return self.wavelets.directionality.orientations_at(self.bandlimit).angles
 
     @functools.cached_property
     def shapes(self) -> dict[int | str, tuple[int, ...]]:
@@ -204,7 +245,7 @@ class SpinWaveletTransform:
         found: dict[int | str, tuple[int, ...]] = {"scaling": self._scaling_transform.shape}
         for j in self.scales:
             grid = self.grid_of(self._tiling.scale_bandlimit(j))
-            found[j] = (self.directions, *grid.shape)
+            found[j] = (self.wavelets.orientations_of(j).count, *grid.shape)
         return found
 
     @property
@@ -235,6 +276,12 @@ class SpinWaveletTransform:
         plain = ScaleDiscretisedTiling
         if type(self._tiling) is not plain or self._tiling.quadrature != "exact":
             found["tiling"] = _tiling_text(self._tiling)
+        directionality = self.wavelets.directionality
+        if not isinstance(directionality, SteerableDirectionality):
+            found["directionality"] = repr(directionality)
+            found["order_step"] = directionality.orientations_at(self.bandlimit).step
+        if self.original_spin:
+            found["original_spin"] = self.original_spin
         return found
 
     def grid_of(self, bandlimit: int) -> Sampling:
@@ -249,77 +296,87 @@ class SpinWaveletTransform:
         )
 
     @functools.cached_property
-    def _scaling_factor(self) -> Array:
-        """sqrt(4 pi / (2l + 1)) phi_l0, at each (l, m) of the scaling part."""
+    def _dual(self) -> Wavelets:
+        """The wavelets of the synthesis."""
+        return self.wavelets.dual
+
+    @functools.cached_property
+    def _scaling_factors(self) -> tuple[Array, Array]:
+        """sqrt(4 pi / (2l + 1)) phi_l0 of analysis and synthesis, at each (l, m) of their part."""
         size = self._scaling_transform.bandlimit
         el = np.arange(size)
-        factor = np.sqrt(4 * np.pi / (2 * el + 1)) * self.wavelets.scaling_harmonics[:size]
-        return np.repeat(factor, 2 * el + 1)
+        ours, dual = (
+            np.sqrt(4 * np.pi / (2 * el + 1)) * wavelets.scaling_harmonics[:size]
+            for wavelets in (self.wavelets, self._dual)
+        )
+        return np.repeat(ours, 2 * el + 1), np.repeat(dual, 2 * el + 1)
 
     def _workspace(self) -> Array:
         """Return room for the Fourier columns of any scale."""
-        largest = max(self._sums(j)[0].workspace_size for j in self.scales)
+        largest = max(sums.workspace_size for sums, *_ in self._scale_sums.values())
         return np.empty(largest, dtype=np.complex128)
 
-    def _sums(self, scale: int, workspace: Array | None = None) -> tuple[GridSums, Array, int]:
-        """Return the sums of one scale, conj(psi) padded to its grid, and its lowest degree."""
-        sums, weights, lowest = self._scale_sums[scale]
-        return replace(sums, workspace=workspace), weights, lowest
-
     @functools.cached_property
-    def _scale_sums(self) -> dict[int, tuple[GridSums, Array, int]]:
+    def _scale_sums(self) -> dict[int, tuple[GridSums | OrientationSums, Array, Array, int]]:
         return {j: self._make_sums(j) for j in self.scales}
 
-    def _make_sums(self, scale: int) -> tuple[GridSums, Array, int]:
-        directionality = self.wavelets.directionality
-        orders = directionality.orders
+    def _make_sums(self, scale: int) -> tuple[GridSums | OrientationSums, Array, Array, int]:
+        """Return the sums of one scale, psi and its dual padded to its grid, and lowest degree."""
         grid = self.grid_of(self._tiling.scale_bandlimit(scale))
-        kept = [i for i, n in enumerate(orders) if abs(n) < grid.bandlimit]
-        psi = self.wavelets.wavelet_harmonics(scale)
-        weights = np.zeros((len(kept), grid.bandlimit), dtype=np.complex128)
-        weights[:, : psi.shape[1]] = psi[kept].conj()
-        mixing = np.ascontiguousarray(directionality.orders_to_orientations[:, kept])
-        lowest = max(self._tiling.scale_lowest_degree(scale), abs(self.spin))
-        sums = GridSums(
-            grid,
-            tuple(orders[i] for i in kept),
-            mixing,
-            self.real,
-            resolve_threads(self.threads),
+        psi, dual = (one.wavelet_harmonics(scale) for one in (self.wavelets, self._dual))
+        # Orders beyond the scale's degrees, and of curvelets those below them, are zero.
+        kept = np.flatnonzero(np.any(psi, axis=1))
+        padding = ((0, 0), (0, grid.bandlimit - psi.shape[1]))
+        lowest = max(self._tiling.scale_lowest_degree(scale), self.wavelets.lowest_degree)
+        return (
+            self._sums_of(grid, self.wavelets.orientations_of(scale), kept),
+            np.pad(psi[kept], padding),
+            np.pad(dual[kept], padding),
+            min(lowest, grid.bandlimit),
         )
-        return sums, weights, min(lowest, grid.bandlimit)
+
+    def _sums_of(
+        self, grid: Sampling, orientations: Orientations, kept: Array
+    ) -> GridSums | OrientationSums:
+        orders = tuple(orientations.orders[i] for i in kept)
+        threads = resolve_threads(self.threads)
+        if orientations.count % 2 and len(orders) > _MOST_MIXED_ORDERS:
+            return OrientationSums(grid, orders, orientations, self.real, threads)
+        mixing = np.ascontiguousarray(orientations.orders_to_orientations[:, kept])
+        return GridSums(grid, orders, mixing, self.real, threads)
 
     def _scale_to_grid(self, flm: Array, scale: int, workspace: Array, *, adjoint: bool) -> Array:
-        sums, weights, lowest = self._sums(scale, workspace)
-        size = sums.sampling.bandlimit**2
+        sums, psi, dual, lowest = self._scale_sums[scale]
+        count = self.shapes[scale][0]
+        weights = dual.conj() * (2 * np.pi / count) if adjoint else psi.conj()
         batch = flm.reshape(-1, flm.shape[-1])
-        if adjoint:
-            weights = weights * (2 * np.pi / self.directions)
-        maps = np.empty((batch.shape[0], *sums.maps_shape), dtype=sums.maps_dtype)
-        for one, out in zip(batch, maps, strict=True):
-            sums.to_grid(one[None, :size], weights, lowest=lowest, quadrature=adjoint, out=out)
+        size = sums.sampling.bandlimit**2
+        maps = np.zeros((batch.shape[0], *sums.maps_shape), dtype=sums.maps_dtype)
+        if sums.orders:
+            sums = replace(sums, workspace=workspace)
+            for one, out in zip(batch, maps, strict=True):
+                sums.to_grid(one[None, :size], weights, lowest=lowest, quadrature=adjoint, out=out)
         return maps.reshape(*flm.shape[:-1], *self.shapes[scale])
 
     def _add_scale(
         self, values: Array, scale: int, flm: Array, workspace: Array, *, adjoint: bool
     ) -> None:
-        sums, weights, lowest = self._sums(scale, workspace)
-        factor = 1.0 if adjoint else 2 * np.pi / self.directions
-        size = sums.sampling.bandlimit**2
+        sums, psi, dual, lowest = self._scale_sums[scale]
+        if not sums.orders:
+            return
+        weights = psi if adjoint else dual * (2 * np.pi / self.shapes[scale][0])
+        sums, size = replace(sums, workspace=workspace), sums.sampling.bandlimit**2
         for one, out in zip(values.reshape(-1, *values.shape[-3:]), flm, strict=True):
             sums.from_grid(
-                one,
-                weights.conj() * factor,
-                out=out[None, :size],
-                lowest=lowest,
-                quadrature=not adjoint,
+                one, weights, out=out[None, :size], lowest=lowest, quadrature=not adjoint
             )
 
     def _decompose(
         self, flm_of: Callable[[int | str], Array], *, adjoint: bool
     ) -> WaveletCoefficients:
         """Analyse every part, each from the harmonic coefficients ``flm_of`` gives for it."""
-        part = flm_of("scaling")[..., : self._scaling_factor.size] * self._scaling_factor
+        factor = self._scaling_factors[1 if adjoint else 0]
+        part = flm_of("scaling")[..., : factor.size] * factor
         transform = self._scaling_transform
         scaling = transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
         workspace = self._workspace()
@@ -349,7 +406,7 @@ class SpinWaveletTransform:
         if "scaling" in wanted:
             transform = self._scaling_transform
             part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
-            flm[..., : part.shape[-1]] += part * self._scaling_factor
+            flm[..., : part.shape[-1]] += part * self._scaling_factors[0 if adjoint else 1]
         return flm
 
     def _checked_parts(self, parts: Collection[int | str]) -> set[int | str]:
@@ -427,6 +484,7 @@ class SpinWaveletTransform:
             If a coefficient is not a finite number.
         """
         flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
+        self._warn_of_lost_degrees(flm)
         return self._decompose(lambda _: flm, adjoint=False)
 
     def analysis_by_part(self, flms: Mapping[int | str, Array]) -> WaveletCoefficients:
@@ -517,6 +575,23 @@ class SpinWaveletTransform:
         """Apply the adjoint of `synthesis_harmonic`; shapes of `analysis_harmonic`."""
         flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
         return self._decompose(lambda _: flm, adjoint=True)
+
+    def _warn_of_lost_degrees(self, flm: Array) -> None:
+        """Warn of a signal that does not come back from its coefficients."""
+        lost = self.wavelets.lost_degrees
+        if not np.any(lost):
+            return
+        flm = check_flm(flm, self.bandlimit)
+        is_lost = np.repeat(lost, 2 * np.arange(self.bandlimit) + 1)
+        power, all_power = np.sum(np.abs(flm[..., is_lost]) ** 2), np.sum(np.abs(flm) ** 2)
+        if power > (64 * self.bandlimit * np.finfo(float).eps) ** 2 * all_power:
+            msg = (
+                f"{power / all_power:.3g} of the signal's power is in degrees that "
+                f"{self.wavelets.directionality} with spin={self.spin} and "
+                f"original_spin={self.original_spin} do not hold, and will not come back; "
+                "wavelets.lost_degrees tells them."
+            )
+            warnings.warn(msg, PrecisionWarning, stacklevel=3)
 
     def _spin_part(self, flm: Array) -> Array:
         """Drop degrees below |s|, which a signal of spin s does not have."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spinsdw.directionality import Directionality
+from spinsdw.directionality import Directionality, Orientations
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import check_integer
 from spinsdw.tiling import Tiling
@@ -27,8 +27,8 @@ class Wavelets:
     tiling : Tiling
         How degrees are shared out between the scales; it sets the bandlimit.
     directionality : Directionality
-        How a wavelet depends on azimuth. It may have more directions than the bandlimit of a
-        small scale, but not more than that of the tiling.
+        How a wavelet depends on azimuth: steerable, curvelet or ridgelet. It may have more
+        directions than the bandlimit of a small scale, but not more than that of the tiling.
     spin : int
         The spin of the signals; below its absolute value all coefficients are zero.
     original_spin : int
@@ -45,8 +45,9 @@ class Wavelets:
 
     Examples
     --------
+    >>> from spinsdw.directionality import SteerableDirectionality
     >>> from spinsdw.tiling import ScaleDiscretisedTiling
-    >>> wavelets = Wavelets(ScaleDiscretisedTiling(32), Directionality(3), spin=2)
+    >>> wavelets = Wavelets(ScaleDiscretisedTiling(32), SteerableDirectionality(3), spin=2)
     >>> wavelets.wavelet_harmonics(3).shape
     (3, 16)
     >>> wavelets.admissibility_error < 1e-14
@@ -76,9 +77,12 @@ class Wavelets:
             msg = f"tiling={self.tiling!r} must be a Tiling; make a ScaleDiscretisedTiling."
             raise ParameterError(msg)
         if not isinstance(self.directionality, Directionality):
-            msg = f"directionality={self.directionality!r} must be a Directionality; make one."
+            msg = (
+                f"directionality={self.directionality!r} must be a Directionality, such as "
+                "SteerableDirectionality(3)."
+            )
             raise ParameterError(msg)
-        directions = self.directionality.directions
+        directions = self.directionality.orientations_at(self.bandlimit).largest_order + 1
         if directions > self.bandlimit:
             msg = (
                 f"directions={directions} must not exceed bandlimit={self.bandlimit}, since no "
@@ -116,9 +120,39 @@ class Wavelets:
     def dual(self) -> Wavelets:
         """The wavelets that synthesise what these analyse: ``original_spin`` with its sign turned.
 
-        Without an original spin they are the wavelets themselves.
+        Without an original spin, and unless the directionality has a `dual` of its own, they are
+        the wavelets themselves.
         """
-        return replace(self, original_spin=-self.original_spin)
+        directionality = self.directionality.dual
+        return replace(self, directionality=directionality, original_spin=-self.original_spin)
+
+    def orientations_of(self, scale: int) -> Orientations:
+        """Return the orders and orientations of the wavelet of one scale.
+
+        Parameters
+        ----------
+        scale : int
+            One of ``scales``.
+
+        Returns
+        -------
+        Orientations
+            Of curvelets there are more, the finer the scale; else they are the same at all.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such scale.
+
+        Examples
+        --------
+        >>> from spinsdw.directionality import SteerableDirectionality
+        >>> from spinsdw.tiling import ScaleDiscretisedTiling
+        >>> wavelets = Wavelets(ScaleDiscretisedTiling(8), SteerableDirectionality(3))
+        >>> wavelets.orientations_of(1).orders
+        (-2, 0, 2)
+        """
+        return self.directionality.orientations_at(self.tiling.scale_bandlimit(scale))
 
     def _lowering_factor(self, bandlimit: int) -> FloatArray:
         """Eq-spin-lowered for each degree below ``bandlimit``, zero below both spins."""
@@ -141,9 +175,9 @@ class Wavelets:
 
         Returns
         -------
-        ndarray, shape (directions, tiling.scale_bandlimit(scale)), complex128
-            Row as in ``directionality.orders``, column is the degree. Zero below the spins, so a
-            small scale may be zero throughout.
+        ndarray, shape (orders, tiling.scale_bandlimit(scale)), complex128
+            Row as in the orders of `orientations_of`, column is the degree. Zero below the spins,
+            so a small scale may be zero throughout.
 
         Raises
         ------
@@ -152,8 +186,9 @@ class Wavelets:
 
         Examples
         --------
+        >>> from spinsdw.directionality import SteerableDirectionality
         >>> from spinsdw.tiling import ScaleDiscretisedTiling
-        >>> wavelets = Wavelets(ScaleDiscretisedTiling(8), Directionality(1))
+        >>> wavelets = Wavelets(ScaleDiscretisedTiling(8), SteerableDirectionality(1))
         >>> psi = wavelets.wavelet_harmonics(1)
         >>> float((8 * np.pi**2 / 5 * psi[0, 2] ** 2).real.round(12))
         1.0
@@ -162,7 +197,7 @@ class Wavelets:
         el = np.arange(bandlimit)
         profile = np.sqrt((2 * el + 1) / (8 * np.pi**2)) * self.tiling.kernel(scale)[:bandlimit]
         profile = profile * self._lowering_factor(bandlimit)
-        return self.directionality.coefficients(bandlimit) * profile
+        return self.directionality.coefficients(bandlimit, self.spin) * profile
 
     @property
     def scaling_harmonics(self) -> FloatArray:
@@ -178,10 +213,20 @@ class Wavelets:
     def admissibility(self) -> FloatArray:
         """The sum of eq-admissibility at each degree, shape (bandlimit,), float64.
 
-        1 from ``lowest_degree`` upwards, 0 below: then synthesis by `dual` undoes analysis. With an
-        original spin each square is a product of wavelet and dual.
+        1 from ``lowest_degree`` upwards, 0 below: then synthesis by `dual` undoes analysis. It is
+        less at ``lost_degrees``. Where the `dual` differs each square is a product with it.
         """
-        dual = self.dual
+        return self._squares(self.dual)
+
+    @property
+    def frame_response(self) -> FloatArray:
+        """The frame operator's value at each degree, shape (bandlimit,), float64 (eq-frame).
+
+        Its smallest and largest, from ``lowest_degree`` upwards, are the bounds of the frame.
+        """
+        return self._squares(self)
+
+    def _squares(self, dual: Wavelets) -> FloatArray:
         el = np.arange(self.bandlimit)
         total = 4 * np.pi / (2 * el + 1) * self.scaling_harmonics * dual.scaling_harmonics
         for scale in self.scales:
@@ -191,6 +236,21 @@ class Wavelets:
         return np.asarray(total)
 
     @property
+    def lost_degrees(self) -> NDArray[np.bool_]:
+        """Which degrees of a signal do not come back, shape (bandlimit,), bool.
+
+        Those of ``l + spin`` odd for ridgelets, where the scaling function does not hold them,
+        and those from ``|spin|`` to below ``|original_spin|``.
+        """
+        held = self.directionality.held_degrees(self.bandlimit, self.spin)
+        held |= self.tiling.scaling_kernel**2 > 1 - 8 * np.finfo(float).eps
+        held[: abs(self.original_spin)] = False
+        held[: abs(self.spin)] = True
+        return ~held
+
+    @property
     def admissibility_error(self) -> float:
-        """The largest ``|admissibility - 1|`` from ``lowest_degree`` upwards."""
-        return float(np.max(np.abs(self.admissibility[self.lowest_degree :] - 1)))
+        """The largest ``|admissibility - 1|`` of all degrees but the lost ones; 0 without any."""
+        kept = ~self.lost_degrees
+        kept[: self.lowest_degree] = False
+        return float(np.max(np.abs(self.admissibility[kept] - 1), initial=0.0))

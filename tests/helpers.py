@@ -153,8 +153,8 @@ def euler_grid(sampling, gammas):
 
 def wavelet_wigner(flm, wavelets, scale):
     """W_lmn = 8pi^2/(2l+1) f_lm conj(psi_ln), shape (..., orders, bandlimit**2)."""
-    found = np.zeros((*flm.shape[:-1], wavelets.directionality.directions, flm.shape[-1]), complex)
     psi = wavelets.wavelet_harmonics(scale)
+    found = np.zeros((*flm.shape[:-1], psi.shape[0], flm.shape[-1]), complex)
     for el in range(psi.shape[1]):
         row = flm[..., None, el**2 : (el + 1) ** 2]
         factor = 8 * np.pi**2 / (2 * el + 1) * psi[:, el, None].conj()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spinsdw.directionality import Directionality
+from spinsdw.directionality import SteerableDirectionality
 from spinsdw.harmonics import eb_to_spin, lower_spin, multiply_by_degree, polarisation_factor
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling
@@ -31,7 +31,7 @@ def random_eb():
 
 def analyse(flm, directions, scale, factor):
     """Return W(rho) of f by factor_l psi_ln: W_lmn = 8pi^2/(2l+1) f_lm conj(factor_l psi_ln)."""
-    wavelets = Wavelets(ScaleDiscretisedTiling(BANDLIMIT), Directionality(directions), 2)
+    wavelets = Wavelets(ScaleDiscretisedTiling(BANDLIMIT), SteerableDirectionality(directions), 2)
     psi = np.zeros((directions, BANDLIMIT), dtype=complex)
     rows = wavelets.wavelet_harmonics(scale)
     psi[:, : rows.shape[1]] = rows
@@ -83,7 +83,7 @@ def test_synthesis_of_the_parts_by_the_printed_wavelet_gives_e_and_b(directions)
     """E~ = sum_j int drho (-Re W_P) R(N_l psi), and the like with Im: there it is right."""
     e_lm, b_lm = random_eb()
     total = np.zeros((2, BANDLIMIT**2), dtype=complex)
-    wavelets = Wavelets(ScaleDiscretisedTiling(BANDLIMIT), Directionality(directions), 2)
+    wavelets = Wavelets(ScaleDiscretisedTiling(BANDLIMIT), SteerableDirectionality(directions), 2)
     wigner = WignerTransform(BANDLIMIT, wavelets.directionality.orders)
     for scale in wavelets.scales:
         values = analyse(eb_to_spin(e_lm, b_lm), directions, scale, 1.0)

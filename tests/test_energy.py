@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spinsdw.directionality import CurveletDirectionality, RidgeletDirectionality
 from spinsdw.energy import energies, inner_product, norm
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.tiling import ScaleDiscretisedTiling
@@ -73,6 +74,34 @@ def test_each_scale_has_the_energy_of_its_wigner_coefficients(
         desired = np.sum((2 * el + 1) / (8 * np.pi**2) * np.abs(wigner) ** 2)
         assert found[scale].shape == (directions,)
         assert abs(found[scale].sum() - desired) < 1e-14 * bandlimit * total
+
+
+@pytest.mark.parametrize(
+    "directionality",
+    [
+        CurveletDirectionality(),
+        CurveletDirectionality(centred=True),
+        RidgeletDirectionality(),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize(("spin", "real"), [(0, True), (0, False), (3, False)])
+def test_curvelets_and_ridgelets_keep_the_products_of_signals(directionality, spin, real):
+    """<W, V> = sum f_lm conj(g_lm), scale by scale sum_lmn (2l+1)/(8 pi^2) |W_lmn|^2."""
+    transform = SpinWaveletTransform(9, spin, directionality=directionality, real=real)
+    el = np.repeat(np.arange(9), 2 * np.arange(9) + 1)
+    one, other = ((random_real_flm if real else random_flm)(9, seed=seed) for seed in (1, 2))
+    for flm in (one, other):
+        flm[(el < spin) | transform.wavelets.lost_degrees[el]] = 0
+    first, second = (transform.analysis_harmonic(flm) for flm in (one, other))
+    bound = np.linalg.norm(one) * np.linalg.norm(other)
+    assert abs(inner_product(transform, first, second) - np.vdot(other, one)) < 1e-14 * bound
+    found = energies(transform, first)
+    for scale in transform.scales:
+        wigner = wavelet_wigner(one, transform.wavelets, scale)
+        desired = np.sum((2 * el + 1) / (8 * np.pi**2) * np.abs(wigner) ** 2)
+        assert found[scale].shape == transform.shapes[scale][:1]
+        assert abs(found[scale].sum() - desired) < 1e-13 * np.sum(np.abs(one) ** 2)
 
 
 @pytest.mark.parametrize(("spin", "directions"), [(0, 2), (2, 3), (-1, 4)])

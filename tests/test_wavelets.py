@@ -9,7 +9,11 @@ from math import factorial
 import numpy as np
 import pytest
 
-from spinsdw.directionality import Directionality
+from spinsdw.directionality import (
+    CurveletDirectionality,
+    RidgeletDirectionality,
+    SteerableDirectionality,
+)
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import degrees
 from spinsdw.tiling import (
@@ -37,7 +41,7 @@ each_tiling = pytest.mark.parametrize("tiling", TILINGS, ids=lambda tiling: repr
 
 def make(bandlimit=32, directions=3, spin=0, **more):
     tiling = ScaleDiscretisedTiling(bandlimit)
-    return Wavelets(tiling, Directionality(directions), spin, **more)
+    return Wavelets(tiling, SteerableDirectionality(directions), spin, **more)
 
 
 def analyse(wavelets, flm):
@@ -68,7 +72,7 @@ def synthesise(wavelets, smooth, detail):
 @pytest.mark.parametrize("spin", [0, 1, 2, -2])
 def test_wavelets_lose_nothing_and_count_nothing_twice(tiling, directions, spin):
     """4pi/(2l+1) |phi_l|**2 + 8pi^2/(2l+1) sum_jm |psi_lm|**2 = 1 for l >= |s|, 0 below."""
-    wavelets = Wavelets(tiling, Directionality(directions), spin)
+    wavelets = Wavelets(tiling, SteerableDirectionality(directions), spin)
     expected = (np.arange(tiling.bandlimit) >= abs(spin)).astype(float)
     assert_close(wavelets.admissibility, expected, ulps=16)
     assert wavelets.admissibility_error == np.max(np.abs(wavelets.admissibility[abs(spin) :] - 1))
@@ -133,6 +137,43 @@ def test_dual_synthesises_what_was_analysed(directions, spin, original_spin):
     assert wavelets.admissibility_error < 32 * np.finfo(float).eps
 
 
+@pytest.mark.parametrize("spin", [0, 3, -2])
+@pytest.mark.parametrize(
+    "directionality",
+    [
+        CurveletDirectionality(),
+        CurveletDirectionality(centred=True),
+        RidgeletDirectionality(),
+        RidgeletDirectionality(1),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("original_spin", [0, 1, -4])
+def test_other_directionalities_lose_their_lost_degrees_alone(directionality, spin, original_spin):
+    """The sum of admissibility is 1 at every degree from |s| and |r| that is not lost."""
+    tiling = ScaleDiscretisedTiling(20, lowest_scale=2)
+    wavelets = Wavelets(tiling, directionality, spin, original_spin=original_spin)
+    el, lost = np.arange(20), wavelets.lost_degrees
+    below = (el >= abs(spin)) & (el < abs(original_spin))
+    ridge = isinstance(directionality, RidgeletDirectionality)
+    # The scaling function holds degrees up to half its bandlimit, 4, without help.
+    assert np.array_equal(
+        lost, below | ((el >= max(abs(spin), 3)) & ((el + spin) % 2 == 1) & ridge)
+    )
+    kept = ~lost & (el >= wavelets.lowest_degree)
+    assert_close(wavelets.admissibility[kept], np.ones(np.sum(kept)), ulps=64)
+    assert np.all(wavelets.admissibility[lost] < 0.9)
+    assert wavelets.admissibility_error < 64 * np.finfo(float).eps
+
+
+def test_frame_response_is_one_for_tight_frames_and_the_square_of_the_factor_for_others():
+    assert_close(make(16, 3, 2).frame_response[2:], np.ones(14), ulps=16)
+    lowered = [factorial(el + 2) // factorial(el - 2) for el in range(2, 16)]
+    found = make(16, 3, original_spin=2).frame_response
+    assert_close(found[2:] / lowered, np.ones(14), ulps=32)
+    assert not np.any(found[:2])
+
+
 def test_energy_is_kept():
     """sum |f|**2 = sum |W^phi|**2 + sum_jlmn (2l+1)/8pi^2 |W^j_lmn|**2."""
     wavelets = make(16, 4, spin=2)
@@ -192,7 +233,7 @@ def test_wavelets_name_the_bad_parameter(parameters, message):
 @pytest.mark.parametrize(
     ("tiling", "directionality", "message"),
     [
-        (8, Directionality(1), "tiling=8 must be a Tiling"),
+        (8, SteerableDirectionality(1), "tiling=8 must be a Tiling"),
         (ScaleDiscretisedTiling(8), 3, "directionality=3 must be a Directionality"),
     ],
 )

@@ -124,7 +124,7 @@ def energy_shares(
     """
     shares: dict[int | str, Array] = {}
     threads, wavelets = transform.threads, transform.wavelets
-    tiling, orders = wavelets.tiling, wavelets.directionality.orders
+    tiling = wavelets.tiling
     for key, shape in transform.shapes.items():
         is_scaling = key == "scaling"
         size = tiling.scaling_bandlimit if is_scaling else tiling.scale_bandlimit(int(key))
@@ -133,9 +133,11 @@ def energy_shares(
             psi = wavelets.scaling_harmonics[None, :size].astype(np.complex128)
             gammas = np.zeros(1)
         else:
+            orientations = wavelets.orientations_of(int(key))
+            orders, gammas = orientations.orders, orientations.angles
             kept = tuple(n for n in orders if abs(n) < size)
             rows = [i for i, n in enumerate(orders) if n in kept]
-            psi, gammas = wavelets.wavelet_harmonics(int(key))[rows, :size], transform.orientations
+            psi = wavelets.wavelet_harmonics(int(key))[rows, :size]
         if not np.any(psi):
             shares[key] = np.zeros(shape)
             continue

@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 import pytest
 
-from spinsdw.directionality import Directionality
+from spinsdw.directionality import SteerableDirectionality
 from spinsdw.harmonics import degrees, index
 from spinsdw.tiling import NeedletTiling, ScaleDiscretisedTiling, SplineTiling
 from spinsdw.wavelets import Wavelets
@@ -78,7 +78,7 @@ def test_wavelets_agree_to_rounding(dilation, bandlimit, lowest_scale, direction
     tiling = ScaleDiscretisedTiling(
         bandlimit, dilation=dilation, lowest_scale=lowest_scale, quadrature="s2let"
     )
-    wavelets = Wavelets(tiling, Directionality(directions), spin)
+    wavelets = Wavelets(tiling, SteerableDirectionality(directions), spin)
     phi, psi = pys2let.wavelet_tiling(dilation, bandlimit, directions, lowest_scale, spin)
     assert_close(wavelets.scaling_harmonics, phi, ulps=16)
     for scale in wavelets.scales:
@@ -100,7 +100,7 @@ def test_spin_lowered_wavelets_agree_to_rounding(original_spin, spin):
         flm, 2.0, bandlimit, lowest_scale, 1, spin, 1, False, original_spin
     )
     tiling = ScaleDiscretisedTiling(bandlimit, lowest_scale=lowest_scale, quadrature="s2let")
-    wavelets = Wavelets(tiling, Directionality(1), spin, original_spin=original_spin)
+    wavelets = Wavelets(tiling, SteerableDirectionality(1), spin, original_spin=original_spin)
     factor = np.sqrt(4 * np.pi / (2 * el + 1))
     assert_close(factor * wavelets.scaling_harmonics[el] * flm, smooth, ulps=64)
     for scale, peer in zip(wavelets.scales, detail.reshape(-1, bandlimit**2), strict=True):

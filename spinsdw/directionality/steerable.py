@@ -1,4 +1,4 @@
-"""How a wavelet depends on azimuth: its orders, its orientations, and steering between them."""
+"""The directionality that steers with the fewest orders."""
 
 from __future__ import annotations
 
@@ -8,17 +8,32 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spinsdw.errors import DataError
+from spinsdw.directionality.base import ComplexArray, Directionality
+from spinsdw.directionality.orientations import Orientations
 from spinsdw.harmonics import check_bandlimit, check_integer
 
-__all__ = ["Directionality"]
+__all__ = ["SteerableDirectionality", "binomial_roots"]
 
-ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
 
-def _binomial_roots(count: int) -> FloatArray:
-    """Return sqrt(binom(count, k) / 2**count) for k = 0..count, as a unit vector."""
+def binomial_roots(count: int) -> FloatArray:
+    """Return sqrt(binom(count, k) / 2**count) for k = 0..count, as a unit vector.
+
+    Parameters
+    ----------
+    count : int
+        Not negative.
+
+    Returns
+    -------
+    ndarray, shape (count + 1,), float64
+
+    Examples
+    --------
+    >>> (binomial_roots(2) ** 2).round(12).tolist()
+    [0.25, 0.5, 0.25]
+    """
     k = np.arange((count + 1) // 2, count)
     # Outwards from the largest term: an underflow is then a true zero, and no factorial or
     # logarithm costs digits.
@@ -30,7 +45,7 @@ def _binomial_roots(count: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Directionality:
+class SteerableDirectionality(Directionality):
     """The directionality that steers exactly with ``directions`` orientations (eq-directionality).
 
     The wavelets hold the azimuthal orders n = -(N-1), -(N-3), ..., N-1 and no other, so their
@@ -49,7 +64,7 @@ class Directionality:
 
     Examples
     --------
-    >>> directionality = Directionality(3)
+    >>> directionality = SteerableDirectionality(3)
     >>> directionality.orders
     (-2, 0, 2)
     >>> (directionality.coefficients(4)[:, 3].real ** 2).round(12).tolist()
@@ -63,35 +78,57 @@ class Directionality:
         directions = check_integer(self.directions, "directions", minimum=1, remedy=remedy)
         object.__setattr__(self, "directions", directions)
 
+    @cached_property
+    def _orientations(self) -> Orientations:
+        return Orientations(self.directions)
+
     @property
     def orders(self) -> tuple[int, ...]:
         """The orders n = -(N-1), -(N-3), ..., N-1 that the wavelets hold."""
-        return tuple(range(1 - self.directions, self.directions, 2))
+        return self._orientations.orders
 
-    @cached_property
+    @property
     def orientations(self) -> FloatArray:
         """The angles k pi / N for k = 0..N-1, shape (directions,), radians, read-only."""
-        angles = np.arange(self.directions) * np.pi / self.directions
-        angles.flags.writeable = False
-        return angles
+        return self._orientations.angles
 
-    @cached_property
+    @property
     def orders_to_orientations(self) -> ComplexArray:
-        """``exp(i n gamma_k)``, shape (directions, directions), read-only.
+        """``exp(i n gamma_k)``, shape (directions, directions); see `Orientations`."""
+        return self._orientations.orders_to_orientations
 
-        Row k, column as in ``orders``: it takes coefficients by order to coefficients by
-        orientation. Its inverse is its conjugate transpose divided by ``directions``.
+    def orientations_at(self, bandlimit: int) -> Orientations:
+        """Return the orders and orientations, the same at every bandlimit.
+
+        Parameters
+        ----------
+        bandlimit : int
+
+        Returns
+        -------
+        Orientations
+
+        Raises
+        ------
+        ParameterError
+            If ``bandlimit`` is not an integer of at least 1.
+
+        Examples
+        --------
+        >>> SteerableDirectionality(2).orientations_at(16).orders
+        (-1, 1)
         """
-        matrix: ComplexArray = np.exp(1j * np.outer(self.orientations, self.orders))
-        matrix.flags.writeable = False
-        return matrix
+        check_bandlimit(bandlimit)
+        return self._orientations
 
-    def coefficients(self, bandlimit: int) -> ComplexArray:
+    def coefficients(self, bandlimit: int, spin: int = 0) -> ComplexArray:  # noqa: ARG002 - as every directionality
         """Return zeta_ln for every degree below a bandlimit (eq-directionality).
 
         Parameters
         ----------
         bandlimit : int
+        spin : int
+            Makes no difference.
 
         Returns
         -------
@@ -106,7 +143,7 @@ class Directionality:
 
         Examples
         --------
-        >>> zeta = Directionality(2).coefficients(5)
+        >>> zeta = SteerableDirectionality(2).coefficients(5)
         >>> np.allclose(np.sum(np.abs(zeta[:, 1:]) ** 2, axis=0), 1)
         True
         """
@@ -118,7 +155,7 @@ class Directionality:
             # The degrees g and g + 1 share the spread g; the widest serves all above.
             last = bandlimit if spread == size - 1 else min(spread + 2, bandlimit)
             margin = (size - 1 - spread) // 2
-            column = phase * _binomial_roots(spread)
+            column = phase * binomial_roots(spread)
             zeta[margin : size - margin, max(spread, 1) : last] = column[:, None]
         return zeta
 
@@ -142,14 +179,7 @@ class Directionality:
 
         Examples
         --------
-        >>> Directionality(3).steering_weights(np.pi / 3).round(12).tolist()
+        >>> SteerableDirectionality(3).steering_weights(np.pi / 3).round(12).tolist()
         [0.0, 1.0, 0.0]
         """
-        values = np.asarray(angle, dtype=np.float64)
-        if not np.isfinite(values).all():
-            msg = f"angle={angle!r} must be finite; give it in radians."
-            raise DataError(msg)
-        difference = values[..., None] - self.orientations
-        phases = difference[..., None] * np.array(self.orders)
-        weights: FloatArray = np.mean(np.cos(phases), axis=-1)
-        return weights
+        return self._orientations.steering_weights(angle)

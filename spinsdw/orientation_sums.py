@@ -1,0 +1,148 @@
+"""`OrientationSums`: what `GridSums` computes, for many orders, mixed by a Fourier transform.
+
+    map_k(theta, phi) = sum_n e^{i n gamma_k} sum_m e^{i m phi} sum_l weight_nl f_lm d^l_mn(theta)
+
+The orders are summed a few at a time, each into a map of its own, and all maps are transformed from
+n to gamma. Of a real signal only n >= 0 is summed: the map of -n is the conjugate of that of n.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spinsdw.directionality import Orientations
+from spinsdw.fourier import from_orders, to_orders
+from spinsdw.grid_sums import GridSums, fill_negative_orders
+from spinsdw.harmonics import conjugate_field
+from spinsdw.parallel import run_tasks, threads_for
+from spinsdw.sampling.base import Sampling
+
+__all__ = ["OrientationSums"]
+
+Array = np.ndarray[Any, Any]
+
+# Sizes |n| whose maps are summed at a time.
+_GROUP = 8
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationSums:
+    """The sums for many orders on a fixed grid.
+
+    Parameters
+    ----------
+    sampling : Sampling
+        The grid.
+    orders : tuple of int
+        The orders n that have weights, symmetric about 0.
+    orientations : Orientations
+        The angles gamma_k of the output maps, an odd number of them.
+    real : bool
+        Whether the maps are real; then ``weight_{-n} = (-1)**n conj(weight_n)``.
+    threads : int
+        Threads to share the work.
+    workspace : ndarray, shape (at least `workspace_size`,), complex128, optional
+        Room for the Fourier columns of a few orders.
+    """
+
+    sampling: Sampling
+    orders: tuple[int, ...]
+    orientations: Orientations
+    real: bool
+    threads: int
+    workspace: Array | None = None
+
+    @property
+    def workspace_size(self) -> int:
+        """Complex numbers that hold the Fourier columns of a few orders."""
+        return max((sums.workspace_size for sums, *_ in self._groups()), default=0)
+
+    @property
+    def maps_dtype(self) -> type[np.generic]:
+        """Type of the output maps."""
+        return np.float64 if self.real else np.complex128
+
+    @property
+    def maps_shape(self) -> tuple[int, int, int]:
+        """Shape of the output maps."""
+        return (self.orientations.count, *self.sampling.shape)
+
+    def _groups(self) -> Iterator[tuple[GridSums, Array, Array]]:
+        """Give sums of a few orders, their rows of weights and their places in the spectrum."""
+        orders = np.array(self.orders)
+        sizes = np.unique(np.abs(orders))
+        for first in range(0, sizes.size, _GROUP):
+            is_chosen = np.isin(np.abs(orders), sizes[first : first + _GROUP])
+            if self.real:
+                is_chosen &= orders >= 0
+            rows = np.flatnonzero(is_chosen)
+            places = orders[rows] // self.orientations.step % self.orientations.count
+            identity = np.eye(rows.size, dtype=np.complex128)
+            chosen = tuple(orders[rows].tolist())
+            sums = GridSums(
+                self.sampling, chosen, identity, False, self.threads, workspace=self.workspace
+            )
+            yield sums, rows, places
+
+    def _spectrum(self) -> Array:
+        count = self.orientations.count
+        shape = (count // 2 + 1 if self.real else count, *self.sampling.shape)
+        return np.empty(shape, dtype=np.complex128)
+
+    def _share_rings(self, call: Callable[[slice], None]) -> None:
+        threads = threads_for(self.sampling.bandlimit, self.threads)
+        tasks = [
+            functools.partial(call, slice(ring, ring + 1)) for ring in range(self.sampling.n_rings)
+        ]
+        run_tasks(tasks, threads)
+
+    def to_grid(
+        self,
+        flm: Array,
+        weights: Array,
+        *,
+        lowest: int = 0,
+        quadrature: bool = False,
+        out: Array | None = None,
+    ) -> Array:
+        """Return maps, shape (orientations, rings, phi); as `GridSums.to_grid`."""
+        maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
+        spectrum = self._spectrum() if self.real else maps
+        spectrum[...] = 0.0
+        if self.real:
+            flm = flm.copy()
+            fill_negative_orders(flm)
+        for sums, rows, places in self._groups():
+            spectrum[places] = sums.to_grid(
+                flm, weights[rows], lowest=lowest, quadrature=quadrature
+            )
+        self._share_rings(lambda ring: from_orders(spectrum[:, ring], maps[:, ring]))
+        return maps
+
+    def from_grid(
+        self,
+        maps: Array,
+        weights: Array,
+        *,
+        out: Array,
+        lowest: int = 0,
+        quadrature: bool = False,
+    ) -> None:
+        """Add to ``out`` (1, L*L) the adjoint sum of `to_grid`; as `GridSums.from_grid`."""
+        spectrum = self._spectrum()
+        self._share_rings(lambda ring: to_orders(maps[:, ring], spectrum[:, ring]))
+        target = np.zeros_like(out) if self.real else out
+        if self.real:
+            # Every order counts with its opposite, and 0 with itself.
+            weights = weights * np.where(np.array(self.orders) == 0, 0.5, 1.0)[:, None]
+        for sums, rows, places in self._groups():
+            sums.from_grid(
+                spectrum[places], weights[rows], out=target, lowest=lowest, quadrature=quadrature
+            )
+        if self.real:
+            out += target + conjugate_field(target)
