@@ -25,6 +25,12 @@ from tests.helpers import assert_close, random_flm
 pytest.importorskip("zarr")
 
 
+@pytest.fixture(autouse=True)
+def _leave_flushing_to_the_system(monkeypatch):
+    """Every chunk is a file, and flushing hundreds of them takes longer than all else."""
+    monkeypatch.setattr("os.fsync", lambda _: None)
+
+
 def make_coefficients(*, real=False, batch=()):
     def draw(seed, *shape):
         count = int(np.prod(shape))
