@@ -34,7 +34,7 @@ LAYERS = (  # bottom to top
     {"wigner_transform"},
     {"coefficients"},
     {"wavelet_transform"},
-    {"energy"},
+    {"energy", "peer_layouts"},
     {"healpix"},
     {"masks", "footprints"},
     {"maps_io"},

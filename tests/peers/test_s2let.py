@@ -5,9 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spinsdw.peer_layouts import coefficients_to_s2let, s2let_to_coefficients, wigner_to_so3
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import EPS, assert_close, needs_compiler, random_flm, random_like
+from tests.helpers import (
+    EPS,
+    assert_close,
+    needs_compiler,
+    random_flm,
+    random_like,
+    wavelet_wigner,
+)
 
 pys2let = pytest.importorskip("pys2let")
 
@@ -186,3 +194,78 @@ def test_full_sky_identity_holds_in_the_peer_too(directions):
         for k, values in enumerate(peer):
             steered = ours.steer(2 * np.pi * k / len(peer))[scale]
             np.testing.assert_allclose(-steered, values, rtol=0, atol=1e-12)
+
+
+# The peer itself works where N > L_j; only its `wav_ind` is wrong there.
+LAYOUTS = [
+    (2.0, 16, 0, 6, 0, 0),
+    (2.0, 17, 0, 5, 2, 0),
+    (3.0, 16, 1, 4, -1, 0),
+    (1.5, 12, 2, 3, 2, 0),
+    (2.0, 16, 1, 2, 1, 1),
+]
+every_layout = pytest.mark.parametrize(
+    ("dilation", "bandlimit", "lowest_scale", "directions", "spin", "upsample"), LAYOUTS
+)
+
+
+@every_layout
+def test_exported_coefficients_are_the_peers(
+    dilation, bandlimit, lowest_scale, directions, spin, upsample
+):
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    flm = random_flm(bandlimit, spin)
+    found = coefficients_to_s2let(transform, transform.analysis_harmonic(flm))
+    signal = transform.harmonic.synthesis(flm)
+    desired = pys2let.analysis_px2wav(signal.ravel(), *arguments)
+    for ours, peer in zip(found, desired, strict=True):
+        assert_close(ours, peer, ulps=32 * bandlimit + 64)
+
+
+@every_layout
+def test_imported_coefficients_are_ours(
+    dilation, bandlimit, lowest_scale, directions, spin, upsample
+):
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    flm = random_flm(bandlimit, spin)
+    signal = transform.harmonic.synthesis(flm)
+    peer = pys2let.analysis_px2wav(signal.ravel(), *arguments)
+    found = s2let_to_coefficients(transform, *peer)
+    ours = transform.analysis_harmonic(flm)
+    assert found.parameters == ours.parameters
+    assert (found - ours).norm() < 1e-13 * ours.norm()
+
+
+@every_layout
+def test_the_peer_synthesises_what_is_exported(
+    dilation, bandlimit, lowest_scale, directions, spin, upsample
+):
+    """Of coefficients changed scale by scale, which are no analysis of anything.
+
+    They stay band-limited: samples that are not, the peer extends over the pole in its own way.
+    """
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    coefficients = transform.analysis_harmonic(random_flm(bandlimit, spin))
+    changed = coefficients * {scale: np.cos(scale) for scale in transform.scales}
+    desired = pys2let.synthesis_wav2px(*coefficients_to_s2let(transform, changed), *arguments)
+    found = transform.synthesis(changed)
+    assert_close(found.ravel(), desired, ulps=32 * bandlimit + 64)
+
+
+@pytest.mark.parametrize(("directions", "spin"), [(3, 2), (4, 0), (1, -1)])
+def test_wigner_coefficients_in_the_peers_layout_are_its(directions, spin):
+    """analysis_lm2lmn: the scales one after the other, each so3's compact storage."""
+    arguments = (2.0, 16, 2, directions, spin, 0)
+    transform = make_transform(*arguments)
+    flm = random_flm(16, spin)
+    peer, _ = pys2let.analysis_lm2lmn(flm, *arguments)
+    orders = transform.wavelets.orientations_of(transform.scales[0]).orders
+    parts = []
+    for scale in transform.scales:
+        size = transform.bandlimits[scale] ** 2
+        wigner = wavelet_wigner(flm, transform.wavelets, scale)[:, :size]
+        parts.append(wigner_to_so3(wigner, orders, directions, storage="compact"))
+    assert_close(np.concatenate(parts), peer, ulps=16)
