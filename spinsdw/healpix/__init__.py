@@ -2,7 +2,8 @@
 
 `pixels` holds resolution and order, `values` the bad-pixel policy, masks' checks and the
 polarisation frame, `alm` healpy's coefficient order, `fitting` the way from maps to coefficients,
-`grids` the way back and the ways to and from exact grids.
+`grids` the way back and the ways to and from exact grids, `coefficients` shows wavelet coefficients
+at the pixels.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from spinsdw.healpix.alm import (
     flm_to_alm,
     spin_flm_to_eb_alm,
 )
+from spinsdw.healpix.coefficients import coefficients_to_healpix
 from spinsdw.healpix.fitting import (
     FitOptions,
     HealpixFit,
@@ -47,6 +49,7 @@ __all__ = [
     "check_mask",
     "check_nside",
     "clean_polarisation",
+    "coefficients_to_healpix",
     "convert_polconv",
     "default_bandlimit",
     "degrade_map",
