@@ -13,7 +13,8 @@ import numpy as np
 
 from spinsdw.directionality import Orientations
 from spinsdw.errors import DataError, ParameterError, ShapeError
-from spinsdw.signals import refuse_masked
+from spinsdw.signals import check_flag, refuse_masked
+from spinsdw.steering import strongest_orientations
 
 __all__ = ["WaveletCoefficients"]
 
@@ -430,12 +431,65 @@ class WaveletCoefficients:
         if np.ndim(angle) != 0 or np.asarray(angle).dtype.kind not in "iuf":
             msg = f"angle={angle!r} must be one real number, in radians; steer once for each."
             raise ParameterError(msg)
-        step = self._parameters.get("order_step", 2)
         return {
-            j: np.einsum(
-                "k,...ktp->...tp",
-                Orientations(values.shape[-3], step).steering_weights(angle),
-                values,
-            )
+            j: np.einsum("k,...ktp->...tp", self._orientations(j).steering_weights(angle), values)
             for j, values in self._wavelets.items()
         }
+
+    def strongest_orientation(
+        self, scale: int, *, modulus: bool | None = None
+    ) -> tuple[Array, Array]:
+        """Find the orientation of the strongest response at every place, and that response.
+
+        The maximum over all gamma of W(gamma), which steering makes a trigonometric polynomial, to
+        rounding (eq-strongest).
+
+        Parameters
+        ----------
+        scale : int
+            One of ``scales``.
+        modulus : bool, optional
+            Whether to maximise the modulus, or the value itself, which must be real then. By
+            default the modulus of complex coefficients and the value of real ones.
+
+        Returns
+        -------
+        angles, strengths : ndarray, shape (..., rings, phi), float64
+            gamma in radians, and W or its modulus there. Angles are below pi, after which all
+            repeats; those of the values of even N, to which half a turn gives the other sign, and
+            those of curvelets that are not centred, below 2 pi. Where all are equal the angle
+            means nothing.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such scale, or ``modulus`` is no bool.
+        DataError
+            If the value of complex coefficients is asked for.
+
+        Examples
+        --------
+        >>> from spinsdw.wavelet_transform import SpinWaveletTransform
+        >>> transform = SpinWaveletTransform(16, spin=2, directions=3)
+        >>> coefficients = transform.analysis_harmonic(np.ones(256))
+        >>> angles, strengths = coefficients.strongest_orientation(3)
+        >>> angles.shape
+        (16, 31)
+        >>> steered = coefficients.steer(angles[4, 5])[3][4, 5]
+        >>> bool(np.isclose(abs(steered), strengths[4, 5], rtol=1e-14))
+        True
+        """
+        values = self[scale]
+        is_complex = np.iscomplexobj(values)
+        modulus = is_complex if modulus is None else check_flag(modulus, "modulus")
+        if is_complex and not modulus:
+            msg = (
+                f"modulus=False needs real coefficients, and scale {scale} is complex; take the "
+                "modulus, or map np.real over the coefficients."
+            )
+            raise DataError(msg)
+        return strongest_orientations(values, self._orientations(scale), modulus=modulus)
+
+    def _orientations(self, scale: int) -> Orientations:
+        count = self._wavelets[scale].shape[-3]
+        return Orientations(count, self._parameters.get("order_step", 2))

@@ -28,7 +28,7 @@ LAYERS = (  # bottom to top
     {"grid_sums"},
     {"tiling"},
     {"directionality"},
-    {"orientation_sums"},
+    {"orientation_sums", "steering"},
     {"wavelets"},
     {"ring_transform", "spin_transform"},
     {"wigner_transform"},
