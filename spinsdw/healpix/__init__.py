@@ -1,9 +1,9 @@
 """HEALPix maps: the only part of the package that knows them from the inside.
 
 `pixels` holds resolution and order, `values` the bad-pixel policy, masks' checks and the
-polarisation frame, `alm` healpy's coefficient order, `fitting` the way from maps to coefficients,
-`grids` the way back and the ways to and from exact grids, `coefficients` shows wavelet coefficients
-at the pixels.
+polarisation frame, `alm` healpy's coefficient order, `fitting` the way from maps to coefficients
+and `quadrature` that of maps without a bandlimit, `grids` the way back and the ways to and from
+exact grids, `coefficients` shows wavelet coefficients at the pixels.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ from spinsdw.healpix.pixels import (
     degrade_map,
     nested_to_ring,
     nside_of,
+    pixel_at,
     pixel_directions,
     ring_to_nested,
     upgrade_map,
 )
+from spinsdw.healpix.quadrature import pixel_weights, quadrature_flm
 from spinsdw.healpix.values import (
     UNSEEN,
     bad_pixel_mask,
@@ -61,8 +63,11 @@ __all__ = [
     "mw_to_healpix",
     "nested_to_ring",
     "nside_of",
+    "pixel_at",
     "pixel_directions",
+    "pixel_weights",
     "qu_to_eb_flm",
+    "quadrature_flm",
     "ring_to_nested",
     "spin_flm_to_eb_alm",
     "upgrade_map",

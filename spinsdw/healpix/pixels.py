@@ -20,6 +20,7 @@ __all__ = [
     "degrade_map",
     "nested_to_ring",
     "nside_of",
+    "pixel_at",
     "pixel_directions",
     "ring_to_nested",
     "upgrade_map",
@@ -126,6 +127,37 @@ def pixel_directions(nside: int) -> tuple[FloatArray, FloatArray]:
     steps = np.repeat(2 * np.pi / rings.n_phi, rings.n_phi)
     longitudes = np.repeat(rings.first_longitudes, rings.n_phi) + along * steps
     return np.repeat(rings.colatitudes, rings.n_phi), longitudes
+
+
+def pixel_at(nside: int, colatitudes: ArrayLike, longitudes: ArrayLike) -> NDArray[np.int64]:
+    """Return the pixels that hold given points; `pixel_directions` has the pixels' centres.
+
+    Parameters
+    ----------
+    nside : int
+        HEALPix resolution.
+    colatitudes, longitudes : array_like
+        Radians; they broadcast together.
+
+    Returns
+    -------
+    ndarray, int64
+        Pixel numbers in RING order, of the broadcast shape.
+
+    Raises
+    ------
+    ParameterError
+        If ``nside`` is not a HEALPix resolution.
+
+    Examples
+    --------
+    >>> pixel_at(1, [0.1, 3.1], [0.2, 0.2]).tolist()
+    [0, 8]
+    """
+    import healpy
+
+    pixels: NDArray[np.int64] = healpy.ang2pix(check_nside(nside), colatitudes, longitudes)
+    return pixels
 
 
 def nested_to_ring(maps: ArrayLike) -> NDArray[Any]:

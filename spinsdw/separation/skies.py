@@ -15,7 +15,9 @@ from spinsdw.healpix import (
     flm_to_map,
     map_to_flm,
     nside_of,
+    pixel_at,
     pixel_directions,
+    quadrature_flm,
 )
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.sampling import MW, MWSS, Sampling
@@ -78,6 +80,14 @@ class Sky(Protocol):
         """Apply the adjoint of `coordinates`."""
         ...
 
+    def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
+        """Return the values of a map at the samples nearest to colatitudes and longitudes."""
+        ...
+
+    def weighted_coefficients(self, maps: Array, bandlimit: int, spin: int) -> Array:
+        """Return <sYlm, maps> of complex maps of any spin that need not be band-limited."""
+        ...
+
 
 @dataclass(frozen=True)
 class HealpixSky:
@@ -136,6 +146,16 @@ class HealpixSky:
     def adjoint_coordinates(self, values: Array) -> Array:
         """Apply the adjoint of `coordinates`."""
         return self.coordinates(values)
+
+    def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
+        """Return the values of a map at the samples nearest to colatitudes and longitudes."""
+        return values[pixel_at(self.nside, *angles)]
+
+    def weighted_coefficients(self, maps: Array, bandlimit: int, spin: int) -> Array:
+        """Return <sYlm, maps> of complex maps of any spin that need not be band-limited."""
+        # The weights are exact where degrees add up to 2.75 nside: beyond nside one step helps.
+        iterations = 0 if bandlimit <= self.nside else 1
+        return quadrature_flm(maps, bandlimit, spin, iterations=iterations, threads=self.threads)
 
 
 @dataclass(frozen=True)
@@ -201,6 +221,19 @@ class GridSky:
     def adjoint_coordinates(self, values: Array) -> Array:
         """Apply the adjoint of `coordinates`."""
         return self._transform(2).adjoint_analysis(values)
+
+    def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
+        """Return the values of a map at the samples nearest to colatitudes and longitudes."""
+        grid, (colatitudes, longitudes) = self.sampling, angles
+        rings = grid.colatitudes
+        step = 2 * np.pi / grid.n_phi
+        ring = np.rint((colatitudes - rings[0]) / step).astype(np.int64)
+        place = np.rint(longitudes / step).astype(np.int64) % grid.n_phi
+        return values[np.clip(ring, 0, grid.n_rings - 1), place]
+
+    def weighted_coefficients(self, maps: Array, bandlimit: int, spin: int) -> Array:
+        """Return <sYlm, maps> of complex maps of any spin that need not be band-limited."""
+        return resize(self._transform(spin).analysis(maps), bandlimit)
 
 
 def position_map(

@@ -1,0 +1,296 @@
+r"""Smooth masks on the sphere with their first two spin derivatives, for pure estimators.
+
+A pure estimator needs a mask that vanishes with its gradient on the edge of the footprint, and
+:math:`\bar\eth M` and :math:`\bar\eth^2 M` that belong to exactly this mask.  Here
+
+.. math:: M = 1_{\{d > w/2\}} \star k_{w/2},
+
+with d the distance to the nearest unobserved sample, w the width of the taper, and k the
+band-limited function that a cap of radius w/2 holds best: the first Slepian function of the cap
+(Simons, Dahlen & Wieczorek 2006, SIAM Review 48, 504).  So M is 0 on what was not observed and 1
+farther than w inside, whatever corners and holes the footprint has, both but for the share of k
+outside its cap, which falls as exp(-L_M w / 2).  M is band-limited, so its derivatives are exact.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spinsdw.errors import ParameterError
+from spinsdw.harmonics import multiply_by_degree, raise_spin
+from spinsdw.healpix import flm_to_map
+from spinsdw.parallel import resolve_threads
+from spinsdw.sampling import MW, MWSS, Sampling
+from spinsdw.separation.skies import GridSky, HealpixSky
+from spinsdw.spin_transform import SpinHarmonicTransform
+
+__all__ = ["SmoothMask", "SmoothMasks", "concentrated_kernel"]
+
+Array = NDArray[Any]
+AnySky = HealpixSky | GridSky
+
+# L_M times the kernel's radius: what is outside its cap falls as exp(-that).  On HEALPix products
+# with a mask of higher degrees are integrated worse than such a share disturbs.
+_CONCENTRATION = {HealpixSky: 18.0, GridSky: 36.0}
+# Largest L_M, in units of nside or of the grid's bandlimit.
+_LARGEST_BANDLIMIT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothMask:
+    r"""A smooth mask at the points of a sky.
+
+    Attributes
+    ----------
+    width : float
+        Width of its taper in radians.
+    values : ndarray, shape of a map, float64
+        M: 0 where not observed, 1 farther than the width inside.
+    first, second : ndarray, shape of a map, complex128
+        The spin derivatives eth-bar M and eth-bar^2 M, of spin -1 and -2.
+    bandlimit : int
+        L_M: the degrees of M are below it.
+    ringing : float
+        Largest \|M\| where nothing was observed, which ought to be 0.
+    """
+
+    width: float
+    values: Array = field(repr=False)
+    first: Array = field(repr=False)
+    second: Array = field(repr=False)
+    bandlimit: int
+    ringing: float
+
+
+def concentrated_kernel(bandlimit: int, radius: float) -> Array:
+    """Return the band-limited axisymmetric function that a cap holds best.
+
+    The eigenvector of a tridiagonal matrix that commutes with the concentration in the cap
+    (Grunbaum, Longhi & Perlstadt 1982).
+
+    Parameters
+    ----------
+    bandlimit : int
+        L: its degrees are l < L.
+    radius : float
+        Radius of the cap in radians.
+
+    Returns
+    -------
+    ndarray, shape (bandlimit,), float64
+        b_l with b_0 = 1: a convolution multiplies f_lm by it.
+
+    Examples
+    --------
+    >>> kernel = concentrated_kernel(40, 0.5)
+    >>> float(kernel[0]), bool(np.all(np.diff(kernel) < 0))
+    (1.0, True)
+    """
+    from scipy.linalg import eigh_tridiagonal
+
+    if bandlimit == 1:
+        return np.ones(1)
+    el = np.arange(bandlimit, dtype=np.float64)
+    diagonal = -el * (el + 1) * math.cos(radius)
+    below = el[:-1]
+    beside = (below * (below + 2) - (bandlimit - 1) * (bandlimit + 1)) * (below + 1)
+    beside /= np.sqrt((2 * below + 1) * (2 * below + 3))
+    _, vectors = eigh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))
+    kernel: Array = vectors[:, 0] / np.sqrt(2 * el + 1)
+    return kernel / kernel[0]
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothMasks:
+    """The smooth masks of a footprint, one for every width of the taper, each made once.
+
+    Parameters
+    ----------
+    sky : HealpixSky or GridSky
+        The pixelisation.
+    mask : ndarray, shape of a map, float64
+        In [0, 1], ring order, 0 where the sky was not observed; `Survey.footprint` has it.
+    largest_share : float, default 0.8
+        Share of the inradius of the footprint that a width may have; wider ones are clipped to it.
+
+    Notes
+    -----
+    Weights between 0 and 1 are taken along: they multiply the indicator before the convolution, and
+    the mask is their smooth version.
+
+    Examples
+    --------
+    >>> from spinsdw.healpix import pixel_directions
+    >>> cap = (pixel_directions(16)[0] < 1.0).astype(float)
+    >>> smooth = SmoothMasks(HealpixSky(16, 33), cap).of_width(0.6)
+    >>> bool(abs(smooth.values[0] - 1) < 1e-6), smooth.ringing < 1e-6
+    (True, True)
+    """
+
+    sky: AnySky
+    mask: Array
+    largest_share: float = 0.8
+    _held: dict[float, SmoothMask] = field(default_factory=dict, init=False, repr=False)
+
+    @functools.cached_property
+    def _tree(self) -> Any:
+        """The unobserved samples."""
+        from scipy.spatial import cKDTree
+
+        hidden = self.mask.ravel() == 0
+        return cKDTree(_vectors(*(angle.ravel()[hidden] for angle in self.sky.points)))
+
+    @functools.cached_property
+    def inradius(self) -> float:
+        """Radius of the largest disc that the footprint holds, in radians: pi on the full sky."""
+        observed = self.mask.ravel() > 0
+        if observed.all():
+            return math.pi
+        points = _vectors(*(angle.ravel()[observed] for angle in self.sky.points))
+        chords, _ = self._tree.query(points, workers=resolve_threads(self.sky.threads))
+        return float(2 * np.arcsin(min(chords.max() / 2, 1.0)))
+
+    @property
+    def narrowest(self) -> float:
+        """The least width: less than it, and the gaps between samples would look observed."""
+        return 2 * _sample_radius(self.sky)
+
+    @property
+    def widest(self) -> float:
+        """The largest width."""
+        return self.largest_share * self.inradius
+
+    def of_width(self, width: float) -> SmoothMask:
+        """Return the mask whose taper has a width in radians, or the widest that fits.
+
+        Raises
+        ------
+        ParameterError
+            If the width is less than the samples resolve, or the footprint holds no such taper.
+        """
+        if not (math.isfinite(width) and width >= self.narrowest):
+            msg = (
+                f"width={width} must be at least {self.narrowest:.4g} radians, what the samples "
+                "of this sky resolve; widen the taper."
+            )
+            raise ParameterError(msg)
+        if self.widest < self.narrowest:
+            msg = (
+                f"mask holds no disc larger than {self.inradius:.4g} radians, too small for any "
+                f"taper of at least {self.narrowest:.4g} radians; give finer or larger maps."
+            )
+            raise ParameterError(msg)
+        width = min(float(width), self.widest)
+        if width not in self._held:
+            self._held[width] = self._make(width)
+        return self._held[width]
+
+    def _make(self, width: float) -> SmoothMask:
+        if np.all(self.mask == 1):
+            values, zeros = np.ones(self.mask.shape), np.zeros(self.mask.shape, np.complex128)
+            return SmoothMask(width, values, zeros, zeros, 1, 0.0)
+        wanted = math.ceil((2 * _CONCENTRATION[type(self.sky)] + math.pi) / width)
+        bandlimit = max(3, min(wanted, _LARGEST_BANDLIMIT * _resolution(self.sky)))
+        radius = (width - math.pi / bandlimit) / 2
+        flm = self._inner_harmonics(bandlimit, width)
+        flm = multiply_by_degree(flm, concentrated_kernel(bandlimit, radius))
+        values = _at_points(self.sky, flm, 0).real.copy()
+        one = raise_spin(flm, 0)
+        first = _at_points(self.sky, one, 1).conj()
+        second = _at_points(self.sky, raise_spin(one, 1), 2).conj()
+        hidden = self.mask == 0
+        ringing = float(np.max(np.abs(values[hidden]), initial=0.0))
+        for array in (values, first, second):
+            array[hidden] = 0.0
+            array.setflags(write=False)
+        return SmoothMask(width, values, first, second, bandlimit, ringing)
+
+    def _inner_harmonics(self, bandlimit: int, width: float) -> Array:
+        """Return the coefficients of the mask where it is farther than width / 2 from its edge."""
+        # A quadrature that is exact below the bandlimit: the kernel's values add up to 1.
+        grid = MWSS(bandlimit)
+        weights = _clenshaw_curtis(bandlimit) * (np.pi / bandlimit)
+        values = np.empty(grid.shape)
+        for ring, colatitude in enumerate(grid.colatitudes):
+            angles = np.full(grid.n_phi, colatitude), grid.longitudes
+            values[ring] = weights[ring] * self._inside(angles, width, np.pi / bandlimit)
+        transform = SpinHarmonicTransform(
+            bandlimit, sampling=grid, real=True, threads=self.sky.threads
+        )
+        return transform.adjoint_synthesis(values)
+
+    def _inside(self, angles: tuple[Array, Array], width: float, step: float) -> Array:
+        """Return the mask at points farther than width / 2 from its edge, rising in one step.
+
+        The kernel is smaller by half a step, for M to be 0 at the edge and 1 one width inside.
+        """
+        bound = 2 * math.sin(min(width / 2 + step, math.pi) / 2)
+        chords, _ = self._tree.query(
+            _vectors(*angles),
+            distance_upper_bound=bound,
+            workers=resolve_threads(self.sky.threads),
+        )
+        # Beyond the bound the distance is infinite.
+        depth = 2 * np.arcsin(np.minimum(chords / 2, 1.0)) - width / 2
+        return np.clip(depth / step + 0.5, 0.0, 1.0) * self.sky.nearest(self.mask, angles)
+
+
+def _vectors(colatitudes: Array, longitudes: Array) -> Array:
+    """Return unit vectors, shape (points, 3)."""
+    sines = np.sin(colatitudes)
+    parts = (sines * np.cos(longitudes), sines * np.sin(longitudes), np.cos(colatitudes))
+    return np.stack(parts, axis=-1)
+
+
+def _resolution(sky: AnySky) -> int:
+    """Return nside or the bandlimit of the grid."""
+    return sky.nside if isinstance(sky, HealpixSky) else sky.sampling.bandlimit
+
+
+def _sample_radius(sky: AnySky) -> float:
+    """Return a bound of the angle from any point to the nearest sample."""
+    # HEALPix pixels reach 0.84 / nside from their centres at most.
+    if isinstance(sky, HealpixSky):
+        return min(0.9 / sky.nside, math.pi)
+    return math.pi / sky.sampling.bandlimit
+
+
+def _clenshaw_curtis(intervals: int) -> Array:
+    """Return the weights of cos(pi t / n), t = 0..n, for integrals over [-1, 1]."""
+    k = np.arange(intervals + 1)
+    moments = np.where(k % 2 == 0, 2.0 / (1.0 - k.astype(np.float64) ** 2 + (k == 1)), 0.0)
+    ends = np.where((k == 0) | (k == intervals), 0.5, 1.0)
+    circle = np.concatenate([moments, moments[intervals - 1 : 0 : -1]])
+    weights: Array = np.fft.ifft(circle).real[: intervals + 1] * 2 * ends
+    return weights
+
+
+def _at_points(sky: AnySky, flm: Array, spin: int) -> Array:
+    """Evaluate coefficients of any bandlimit at the samples of a sky, complex128."""
+    if isinstance(sky, HealpixSky):
+        return flm_to_map(flm, sky.nside, spin, threads=sky.threads)
+    bandlimit = math.isqrt(flm.shape[-1])
+    grid, part = _finer_grid(sky.sampling, bandlimit)
+    transform = SpinHarmonicTransform(grid.bandlimit, spin, sampling=grid, threads=sky.threads)
+    padded = np.zeros(grid.bandlimit**2, dtype=np.complex128)
+    padded[: flm.size] = flm
+    return transform.synthesis(padded)[part].copy()
+
+
+def _finer_grid(grid: Sampling, bandlimit: int) -> tuple[Sampling, tuple[slice, slice]]:
+    """Return a grid of at least a bandlimit that holds the samples of another one, and where."""
+    times = -(-bandlimit // grid.bandlimit)
+    if isinstance(grid, MW):
+        # theta = (2 t + 1) pi / (2 L - 1): the odd multiples of 2 L - 1 are the finer grids.
+        times = (
+            1 if times == 1 else -(-(2 * bandlimit - 1) // (2 * grid.bandlimit - 1)) // 2 * 2 + 1
+        )
+        finer: Sampling = MW((times * (2 * grid.bandlimit - 1) + 1) // 2)
+        return finer, (slice(times // 2, None, times), slice(None, None, times))
+    return MWSS(times * grid.bandlimit), (slice(None, None, times), slice(None, None, times))
