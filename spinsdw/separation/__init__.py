@@ -6,6 +6,9 @@ or its name, as ``method``.
 
 from __future__ import annotations
 
+from spinsdw.separation.masked import Masked
+from spinsdw.separation.needlets import SpinNeedlets
 from spinsdw.separation.pseudo import Pseudo
+from spinsdw.separation.recycling import Recycling
 
-__all__ = ["Pseudo"]
+__all__ = ["Masked", "Pseudo", "Recycling", "SpinNeedlets"]

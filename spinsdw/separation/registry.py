@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from spinsdw.errors import ParameterError
+from spinsdw.separation.masked import Masked
 from spinsdw.separation.method import Method
+from spinsdw.separation.needlets import SpinNeedlets
 from spinsdw.separation.pseudo import Pseudo
+from spinsdw.separation.recycling import Recycling
 from spinsdw.separation.report import check_choice
 
 __all__ = ["METHODS", "resolve_method"]
 
-METHODS: dict[str, type[Method]] = {kind.name: kind for kind in (Pseudo,)}
+METHODS: dict[str, type[Method]] = {
+    kind.name: kind for kind in (Masked, Pseudo, Recycling, SpinNeedlets)
+}
 
 
 def resolve_method(method: object) -> Method:
