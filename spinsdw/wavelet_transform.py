@@ -15,14 +15,24 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality, Orientations, SteerableDirectionality
 from spinsdw.errors import ParameterError, PrecisionWarning, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_bandlimit, check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm, resize
 from spinsdw.orientation_sums import OrientationSums
 from spinsdw.parallel import resolve_threads
+from spinsdw.ring_transform import HealpixTransform
+from spinsdw.rotated_wavelets import rotated_harmonics
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
 from spinsdw.wavelets import Wavelets
+from spinsdw.wigner_parts import (
+    check_parts,
+    flm_to_parts,
+    orders_to_samples,
+    part_shapes,
+    parts_to_flm,
+    samples_to_orders,
+)
 
 __all__ = ["SpinWaveletTransform"]
 
@@ -575,6 +585,213 @@ class SpinWaveletTransform:
         """Apply the adjoint of `synthesis_harmonic`; shapes of `analysis_harmonic`."""
         flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
         return self._decompose(lambda _: flm, adjoint=True)
+
+    def analysis_wigner(self, flm: Array) -> dict[int | str, Array]:
+        """Compute the Wigner coefficients of every scale from harmonic coefficients.
+
+        They are the harmonic form of what `analysis_harmonic` samples (eq-analysis), a product at
+        each degree. Whether the transform is real, or multiresolution, makes no difference.
+
+        Parameters
+        ----------
+        flm : ndarray, shape (..., bandlimit**2), complex
+            As for `analysis_harmonic`.
+
+        Returns
+        -------
+        dict
+            "scaling" -> W^phi_lm, shape (..., L_phi**2), and j -> W^j_lmn, shape (..., orders,
+            L_j**2), complex128, one row for each order n of ``wavelets.orientations_of(j)``. L_j
+            and L_phi are ``tiling.scale_bandlimit(j)`` and ``tiling.scaling_bandlimit``.
+
+        Raises
+        ------
+        ShapeError, DataError
+            As `analysis_harmonic`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> transform = SpinWaveletTransform(16, spin=2, directions=3)
+        >>> parts = transform.analysis_wigner(np.ones(256))
+        >>> parts[2].shape, parts["scaling"].shape
+        ((3, 64), (1,))
+        >>> bool(np.allclose(transform.synthesis_wigner(parts)[4:], 1, rtol=0, atol=1e-14))
+        True
+        """
+        flm = self._spin_part(check_flm(flm, self.bandlimit))
+        self._warn_of_lost_degrees(flm)
+        return flm_to_parts(self.wavelets, flm, is_analysis=True)
+
+    def synthesis_wigner(self, parts: Mapping[int | str, Array]) -> Array:
+        """Compute harmonic coefficients from the Wigner coefficients of every scale.
+
+        The inverse of `analysis_wigner` (eq-synthesis).
+
+        Parameters
+        ----------
+        parts : mapping
+            As `analysis_wigner` returns them, or changed.
+
+        Returns
+        -------
+        ndarray, shape (..., bandlimit**2), complex128
+            The coefficients, zero for el < abs(spin).
+
+        Raises
+        ------
+        ParameterError
+            If a part is missing or not known.
+        ShapeError
+            If a part has another shape.
+        DataError
+            If a value is not a finite number.
+        """
+        checked = check_parts(self.wavelets, parts)
+        return self._spin_part(parts_to_flm(self._dual, checked, is_analysis=False))
+
+    def adjoint_analysis_wigner(self, parts: Mapping[int | str, Array]) -> Array:
+        """Apply the adjoint of `analysis_wigner`; shapes and errors of `synthesis_wigner`."""
+        checked = check_parts(self.wavelets, parts)
+        return self._spin_part(parts_to_flm(self.wavelets, checked, is_analysis=True))
+
+    def adjoint_synthesis_wigner(self, flm: Array) -> dict[int | str, Array]:
+        """Apply the adjoint of `synthesis_wigner`; shapes and errors of `analysis_wigner`."""
+        flm = self._spin_part(check_flm(flm, self.bandlimit))
+        return flm_to_parts(self._dual, flm, is_analysis=False)
+
+    def coefficients_to_wigner(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
+        """Transform wavelet coefficients to the Wigner coefficients of every scale, exactly.
+
+        Of what an analysis returned it gives what `analysis_wigner` would have; of other
+        coefficients it is the part within each scale's bandlimit.
+
+        Parameters
+        ----------
+        coefficients : WaveletCoefficients
+            As for `synthesis_harmonic`.
+
+        Returns
+        -------
+        dict
+            As `analysis_wigner` returns it; `wigner_to_coefficients` is the inverse.
+
+        Raises
+        ------
+        ShapeError, ParameterError, DataError
+            As `synthesis_harmonic`.
+        """
+        checked, shapes = self._checked(coefficients), part_shapes(self.wavelets)
+        scaling = self._scaling_transform.analysis(checked["scaling"])
+        parts: dict[int | str, Array] = {"scaling": scaling[..., : shapes["scaling"][0]]}
+        for j in self.scales:
+            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            orientations = self.wavelets.orientations_of(j)
+            rows = samples_to_orders(checked[j], grid, orientations, threads=self.threads)
+            parts[j] = rows[..., : shapes[j][1]]
+        return parts
+
+    def wigner_to_coefficients(self, parts: Mapping[int | str, Array]) -> WaveletCoefficients:
+        """Sample the Wigner coefficients of every scale at its places and orientations.
+
+        Parameters
+        ----------
+        parts : mapping
+            As `analysis_wigner` returns them, or changed. If the transform is real, they must be
+            those of a real function, of which only m >= 0 is read.
+
+        Returns
+        -------
+        WaveletCoefficients
+            As `analysis_harmonic` returns them.
+
+        Raises
+        ------
+        ParameterError, ShapeError, DataError
+            As `synthesis_wigner`.
+        """
+        checked = check_parts(self.wavelets, parts)
+        scaling = self._scaling_transform
+        part = resize(checked["scaling"], scaling.bandlimit)
+        wavelets = {}
+        for j in self.scales:
+            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            orientations = self.wavelets.orientations_of(j)
+            wavelets[j] = orders_to_samples(
+                checked[j], grid, orientations, real=self.real, threads=self.threads
+            )
+        return WaveletCoefficients(scaling.synthesis(part), wavelets, self._parameters)
+
+    def wavelet_map(
+        self,
+        scale: int | str,
+        rotation: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        *,
+        sampling: str | Sampling | None = None,
+        nside: int | None = None,
+    ) -> Array:
+        """Compute a wavelet, or the scaling function, in pixel space, at any place and orientation.
+
+        The coefficient of the signal there, W(rotation), is the integral of the signal times the
+        conjugate of this map.
+
+        Parameters
+        ----------
+        scale : int or "scaling"
+            One of ``scales``, or the scaling function.
+        rotation : tuple of float
+            Euler angles alpha, beta, gamma in radians: longitude and colatitude of the centre,
+            and the orientation. By default at the north pole.
+        sampling : str or Sampling, optional
+            The grid, whose bandlimit may be any from that of the scale on; the transform's own by
+            default.
+        nside : int, optional
+            Makes a HEALPix map in ring order instead.
+
+        Returns
+        -------
+        ndarray, shape (rings, phi) or (12 * nside**2,), complex128 (float64 if ``real``)
+            Of the signal's spin: Q + iU for spin 2. For spin 0 it is real in any case.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such scale, a parameter breaks its rule, the grid has not the bandlimit
+            that the scale needs, or both grid and nside are given.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> transform = SpinWaveletTransform(32, directions=3, real=True)
+        >>> wavelet = transform.wavelet_map(3, (np.pi, np.pi / 2, 0.0), sampling="mwss")
+        >>> [int(i) for i in np.unravel_index(np.argmax(np.abs(wavelet)), wavelet.shape)]
+        [16, 32]
+        """
+        transform = self._map_transform(sampling, nside)
+        flm = rotated_harmonics(self.wavelets, scale, rotation)
+        if flm.size > transform.bandlimit**2:
+            msg = (
+                f"sampling={sampling!r} must have a bandlimit of at least that of scale {scale}, "
+                f"{int(np.sqrt(flm.size))}; raise it."
+            )
+            raise ParameterError(msg)
+        return transform.synthesis(resize(flm, transform.bandlimit))
+
+    def _map_transform(
+        self, sampling: str | Sampling | None, nside: int | None
+    ) -> SpinHarmonicTransform | HealpixTransform:
+        if nside is None:
+            grid = self._grid if sampling is None else sampling
+            size = grid.bandlimit if isinstance(grid, Sampling) else self.bandlimit
+            return SpinHarmonicTransform(
+                size, self.spin, sampling=grid, real=self.real, threads=self.threads
+            )
+        if sampling is not None:
+            msg = f"sampling={sampling!r} cannot be given with nside={nside!r}; drop one."
+            raise ParameterError(msg)
+        return HealpixTransform(
+            nside, self.bandlimit, self.spin, real=self.real, threads=self.threads
+        )
 
     def _warn_of_lost_degrees(self, flm: Array) -> None:
         """Warn of a signal that does not come back from its coefficients."""

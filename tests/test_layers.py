@@ -30,6 +30,7 @@ LAYERS = (  # bottom to top
     {"directionality"},
     {"orientation_sums", "steering"},
     {"wavelets"},
+    {"rotated_wavelets", "wigner_parts"},
     {"ring_transform", "spin_transform"},
     {"wigner_transform"},
     {"coefficients"},
