@@ -35,7 +35,7 @@ LAYERS = (  # bottom to top
     {"wigner_transform"},
     {"coefficients"},
     {"wavelet_transform"},
-    {"energy", "peer_layouts"},
+    {"energy", "peer_layouts", "statistics"},
     {"healpix"},
     {"masks", "footprints"},
     {"maps_io"},
