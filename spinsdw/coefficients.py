@@ -347,8 +347,8 @@ class WaveletCoefficients:
             T >= 0. A number holds for every scale and leaves the scaling part; a mapping holds for
             the parts it names, by a number or by an array that broadcasts to the part's shape.
         rule : {"hard", "soft", "garrote"}
-            What multiplies w where |w| > T: 1, ``1 - T / |w|`` or ``1 - T**2 / |w|**2``. Zero
-            elsewhere. |w| is the modulus, so that phases stay.
+            What multiplies w where ``|w| > T``: 1, ``1 - T / |w|`` or ``1 - T**2 / |w|**2``. Zero
+            elsewhere. The modulus is shrunk, so that phases stay.
 
         Returns
         -------

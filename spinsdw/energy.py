@@ -1,7 +1,6 @@
 """Energies of wavelet coefficients: integrals over the rotation group, which a plain sum is not.
 
-    integral |W|^2 d rho = (2 pi / K) sum_k integral |W(theta, phi, gamma_k)|^2 sin(theta) d theta
-    d phi
+    ``integral |W|^2 d rho = (2 pi / K) sum_k integral |W(theta, phi, gamma_k)|^2 d Omega``
 
 with K orientations. The Fourier columns F_m(theta) of one orientation are trigonometric polynomials
 of parity (-1)^(m + n), n any of its orders, so the sampling's own quadrature in theta integrates
@@ -110,7 +109,7 @@ def energies(
 ) -> dict[int | str, Array]:
     """Compute the energy of the scaling part, and of every scale at every orientation.
 
-    All of them add up to the energy of the signal, sum |f_lm|^2 (eq-parseval).
+    All of them add up to the energy of the signal, ``sum |f_lm|^2`` (eq-parseval).
 
     Parameters
     ----------

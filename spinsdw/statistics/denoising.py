@@ -31,8 +31,8 @@ def denoise(
 ) -> WaveletCoefficients:
     """Shrink the wavelet coefficients of a noisy signal to estimate those of the signal.
 
-    At each place the power e^2 = sum_k |W_k|^2 / K of all K orientations is held against that of
-    the noise: W_k becomes (1 - t^2 sigma^2 / e^2) W_k, or 0 where that is negative
+    At each place the power ``e^2 = sum_k |W_k|^2 / K`` of all K orientations is held against that
+    of the noise: W_k becomes (1 - t^2 sigma^2 / e^2) W_k, or 0 where that is negative
     (eq-shrinkage). Unlike a threshold for each orientation alone it treats a structure alike
     however it is turned. The scaling part stays.
 
@@ -43,8 +43,8 @@ def denoise(
     coefficients : WaveletCoefficients
         Of signal plus noise; leading axes are a batch of signals with the same noise.
     noise_spectrum : array_like, shape (at least bandlimit,)
-        N_l = <|n_lm|^2>, of Gaussian isotropic noise. White noise of ``d`` in Q and in U, each, per
-        unit of angle has ``2 * d**2`` for P = Q + iU.
+        ``N_l = <|n_lm|^2>``, of Gaussian isotropic noise. White noise of ``d`` in Q and in U, each,
+        per unit of angle has ``2 * d**2`` for P = Q + iU.
     levels : float or mapping of int to float, optional
         t of every scale, or of each. By default `shrinkage_levels` finds them.
 

@@ -33,10 +33,10 @@ class Scattering:
     Attributes
     ----------
     first : mapping of int to ndarray, shape (..., directions)
-        Mean of |W^j| at each orientation; the unit of the signal.
+        Mean of ``|W^j|`` at each orientation; the unit of the signal.
     second : mapping of (int, int) to ndarray, shape (..., directions, directions)
-        Under (j1, j2), j2 < j1: mean of ||W^j1| * psi^j2|, first the orientation of j1, then that
-        of j2; the unit of the signal. At small scales that have fewer degrees than there are
+        Under (j1, j2), j2 < j1: mean of ``||W^j1| * psi^j2|``, first the orientation of j1, then
+        that of j2; the unit of the signal. At small scales that have fewer degrees than there are
         directions, the last axis is shorter.
     """
 
@@ -47,9 +47,9 @@ class Scattering:
 def scattering(transform: SpinWaveletTransform, coefficients: WaveletCoefficients) -> Scattering:
     """Summarise a signal by the means of moduli, to second order.
 
-    S1(j, k) = mean |W^j_k| and S2(j1, k1, j2, k2) = mean ||W^j1_k1| * psi^j2_k2| over the sphere
-    (eq-scattering): how strong structures of a scale are, and how their strength itself varies at
-    every larger scale. A Gaussian field has nearly none of the latter.
+    ``S1(j, k) = mean |W^j_k|`` and ``S2(j1, k1, j2, k2) = mean ||W^j1_k1| * psi^j2_k2|`` over the
+    sphere (eq-scattering): how strong structures of a scale are, and how their strength itself
+    varies at every larger scale. A Gaussian field has nearly none of the latter.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def scattering(transform: SpinWaveletTransform, coefficients: WaveletCoefficient
 
     Notes
     -----
-    |W| is a real scalar with no finite bandlimit: its mean, and its transform with the spin-0
+    ``|W|`` is a real scalar with no finite bandlimit: its mean, and its transform with the spin-0
     wavelets of the same kind, are those of its samples on the scale's grid. Cost O(N^2 L^3).
 
     Examples

@@ -37,14 +37,14 @@ def check_spectrum(spectrum: ArrayLike, bandlimit: int, name: str = "spectrum") 
 def wavelet_variance(wavelets: Wavelets, spectrum: ArrayLike) -> dict[int | str, float]:
     """Return the variance of the coefficients of every scale, for a given power spectrum.
 
-    <|W^j|^2> = sum_ln C_l |psi^j_ln|^2, the same at every place and orientation (eq-variance).
+    ``<|W^j|^2> = sum_ln C_l |psi^j_ln|^2``, the same at every place and orientation (eq-variance).
 
     Parameters
     ----------
     wavelets : Wavelets
         Such as ``transform.wavelets``.
     spectrum : array_like, shape (at least bandlimit,)
-        C_l = <|f_lm|^2> from l = 0 on, of the spin field itself: for P = Q + iU that is EE + BB.
+        ``C_l = <|f_lm|^2>`` from l = 0 on, of the spin field itself: for P = Q + iU EE + BB.
         EE alone gives the variance of the real part of W, which is that of the scalar E, and BB
         that of the imaginary part; a cross spectrum gives the covariance of two fields'
         coefficients, and may be negative.
