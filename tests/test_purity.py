@@ -11,6 +11,7 @@ import pytest
 from benchmarks.purity import DISTANCES, SETTINGS, SURVEYS, Result, SeparatorBands, Skies, judge
 from benchmarks.purity.bands import evaluated_bands, synthesised_bands
 from benchmarks.purity.measures import Regions
+from benchmarks.purity.ratio import Powers, RatioTest, estimate_ratio, measure_ratio
 from benchmarks.purity.skies import KINDS
 from benchmarks.purity.surveys import survey_mask
 from spinsdw.masks import distance_to_edge, fill_holes
@@ -176,3 +177,40 @@ def test_skies_are_kept_and_the_same(skies):
     again = Skies("cmb", TINY, skies.folder / "other")
     np.testing.assert_array_equal(again.qu("E", 200), (q, u))
     assert len(list((skies.folder / "other").iterdir())) == 1
+
+
+def random_powers(scales=3):
+    """Band powers of skies whose mean, response and scatter differ from band to band."""
+    rng = np.random.default_rng(0)
+    sizes = np.geomspace(1, 100, scales)
+    rest, tensors = (sizes * (3 + rng.standard_normal((n, scales))) for n in (40, 20))
+    return rest, tensors
+
+
+@pytest.mark.parametrize("truth", [0.0, 0.01, 0.3])
+def test_ratio_is_exact_where_powers_follow_the_model(truth):
+    """p = m + (r - 0.01) D gives r, whatever the covariance"""
+    rest, tensors = random_powers()
+    data = rest.mean(axis=0) + (truth - 0.01) * tensors.mean(axis=0)
+    found = estimate_ratio(Powers(data[None], rest, tensors))
+    assert abs(found[0] - truth) < 1e-12
+
+
+def test_ratio_is_blind_to_the_scale_of_a_band_and_to_bands_without_power():
+    rest, tensors = random_powers()
+    data = rest[:5]
+    scales = np.array([0.1, 7.0, 3.0])
+    one = estimate_ratio(Powers(data, rest, tensors))
+    other = estimate_ratio(Powers(data * scales, rest * scales, tensors * scales))
+    assert_close(other, one, ulps=2**14)
+    padded = (np.pad(values, [(0, 0), (0, 1)]) for values in (data, rest, tensors))
+    assert_close(estimate_ratio(Powers(*padded)), one, ulps=2**14)
+
+
+def test_shift_of_the_true_b_is_zero():
+    """A method that sees the whole sky finds the r of the true B, sky by sky."""
+    found = measure_ratio(fold(1.0), "A", TINY, label="perfect", share=0.1)
+    np.testing.assert_allclose(found.found, found.true, rtol=0, atol=1e-4 * found.true_sigma)
+    assert found.found.size == 10
+    again = RatioTest.from_json(json.loads(json.dumps(found.to_json())))
+    assert abs(again.sigma - found.sigma) < 1e-5

@@ -68,8 +68,8 @@ def judge(  # noqa: PLR0913 - what is judged, on which skies, and how
         for name, values in _squares(timed, Skies(model, setting), chunk, linearity):
             sums[name] = sums.get(name, 0) + regions.sums(values)
     return Result(
-        method=label or _label(method),
-        choices=_choices(method),
+        method=label or _label(bands),
+        choices=_choices(bands),
         survey=survey,
         model=model,
         setting=setting.name,
@@ -91,15 +91,21 @@ def _bands_of(method: object, mask: Array, setting: Setting) -> Bands:
     return SeparatorBands.of_method(method, mask, setting)
 
 
-def _label(method: object) -> str:
-    method = method.method if isinstance(method, EBSeparator) else method
-    return method if isinstance(method, str) else str(getattr(method, "name", method))
+def _separator(bands: Bands) -> EBSeparator | None:
+    return bands.separator if isinstance(bands, SeparatorBands) else None
 
 
-def _choices(method: object) -> str:
-    if isinstance(method, EBSeparator):
-        return f"{method.method}, directions={method.directions}"
-    return str(method)
+def _label(bands: Bands) -> str:
+    separator = _separator(bands)
+    return str(separator.method.name if separator else bands)
+
+
+def _choices(bands: Bands) -> str:
+    separator = _separator(bands)
+    if separator is None:
+        return str(bands)
+    directions = separator.directions
+    return str(separator.method) + (f", directions={directions}" if directions > 1 else "")
 
 
 class _Timed:

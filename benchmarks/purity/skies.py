@@ -86,11 +86,14 @@ class Skies:
         Resolution and beam.
     folder : Path, optional
         Where they are kept; a folder of the system's temporary directory when None.
+    keep : bool
+        False makes every sky anew, for skies that are looked at once.
     """
 
     model: str
     setting: Setting
     folder: Path | None = None
+    keep: bool = True
 
     @property
     def sky_model(self) -> SkyModel:
@@ -136,6 +139,8 @@ class Skies:
         return spin_to_eb(plm)[1]
 
     def _kept(self, what: str, kind: str, seed: int, make: Callable[[], Array]) -> Array:
+        if not self.keep:
+            return make()
         folder = self.folder or Path(tempfile.gettempdir()) / f"spinsdw-purity-{os.getuid()}"
         name = f"{self.model}-{self.setting.name}-{spinsdw.__version__}-{kind}-{seed}-{what}.npy"
         path = folder / name

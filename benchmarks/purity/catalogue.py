@@ -1,0 +1,47 @@
+"""The methods that are judged, by name: those of the package, and NaMaster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.purity.bands import SeparatorBands
+from benchmarks.purity.namaster import NaMasterBands
+from benchmarks.purity.settings import Setting
+from spinsdw.separation.registry import METHODS
+
+__all__ = ["NAMASTER", "Entry", "catalogue"]
+
+Array = np.ndarray
+Entry = Callable[[Array, Setting], object]
+"""Mask and setting -> what `judge` takes."""
+
+NAMASTER = "NaMaster"
+APODISATIONS = tuple((profile, width) for profile in ("C1", "C2") for width in (1, 2, 4, 6, 9, 14))
+
+
+def _namaster(profile: str, width: float) -> Entry:
+    return lambda mask, setting: NaMasterBands(mask, setting, profile, width)
+
+
+def _own(name: str, directions: int) -> Entry:
+    return lambda mask, setting: SeparatorBands.of_method(
+        name, mask, setting, directions=directions
+    )
+
+
+def catalogue(name: str) -> list[tuple[str, Entry]]:
+    """Return the variants of a method: the label of its results, and how to make it.
+
+    ``name`` is a method of `spinsdw.separation`, with ":3" for three directions; or "namaster",
+    which has a variant for every apodisation.
+    """
+    if name == "namaster":
+        return [(NAMASTER, _namaster(*choice)) for choice in APODISATIONS]
+    method, _, directions = name.partition(":")
+    if method not in METHODS:
+        msg = f"method {method!r} is not known; use namaster or one of {', '.join(METHODS)}."
+        raise SystemExit(msg)
+    label = f"{method}, N = {directions}" if directions else method
+    return [(label, _own(method, int(directions or 1)))]
