@@ -472,6 +472,24 @@ class SpinWaveletTransform:
         """
         return self._checked(coefficients)
 
+    def from_arrays(self, arrays: Mapping[int | str, Array]) -> WaveletCoefficients:
+        """Return coefficients of this transform made of arrays; the inverse of `arrays`.
+
+        Parameters
+        ----------
+        arrays : mapping of (int or "scaling") to ndarray
+            Of ``shapes``, with one batch before them.
+
+        Raises
+        ------
+        ShapeError, ParameterError, DataError
+            As `synthesis_harmonic`.
+        """
+        wavelets = {int(key): values for key, values in arrays.items() if key != "scaling"}
+        found = WaveletCoefficients(arrays["scaling"], wavelets, self._parameters)
+        self._checked(found)
+        return found
+
     def analysis_harmonic(self, flm: Array) -> WaveletCoefficients:
         """Compute wavelet coefficients from harmonic coefficients.
 

@@ -222,9 +222,20 @@ class Wavelets:
     def frame_response(self) -> FloatArray:
         """The frame operator's value at each degree, shape (bandlimit,), float64 (eq-frame).
 
-        Its smallest and largest, from ``lowest_degree`` upwards, are the bounds of the frame.
+        It is 1 from ``lowest_degree`` upwards where wavelets and `dual` are the same.
         """
         return self._squares(self)
+
+    @property
+    def frame_bounds(self) -> tuple[float, float]:
+        """The bounds of the frame: the least and largest of ``frame_response`` (eq-frame).
+
+        Of the degrees that the wavelets hold: signals with ``lost_degrees`` are left out.
+        """
+        kept = ~self.lost_degrees
+        kept[: self.lowest_degree] = False
+        response = self.frame_response[kept]
+        return float(np.min(response, initial=np.inf)), float(np.max(response, initial=0.0))
 
     def _squares(self, dual: Wavelets) -> FloatArray:
         el = np.arange(self.bandlimit)

@@ -35,6 +35,8 @@ LAYERS = (  # bottom to top
     {"wigner_transform"},
     {"coefficients"},
     {"wavelet_transform"},
+    {"vector_spaces"},
+    {"operators"},
     {"energy", "peer_layouts", "statistics"},
     {"healpix"},
     {"masks", "footprints"},
