@@ -16,6 +16,7 @@ import numpy as np
 from spinsdw.healpix import map_to_flm, pixel_directions
 from spinsdw.masks import cap_mask
 from spinsdw.polarisation import EBSeparator
+from spinsdw.rotation import rotate_flm
 from spinsdw.sampling import MW
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -59,6 +60,7 @@ def warm_up(threads: int | None = None) -> dict[str, float]:
     """
     paths: dict[str, Callable[[int | None], None]] = {
         "spin transforms": _spin_transforms,
+        "rotations": _rotations,
         "Wigner transforms": _wigner_transforms,
         "wavelet transforms": _wavelet_transforms,
         "HEALPix fits": _healpix_fits,
@@ -79,6 +81,11 @@ def _spin_transforms(threads: int | None) -> None:
             maps = transform.synthesis(np.zeros(BANDLIMIT**2, dtype=np.complex128))
             transform.adjoint_analysis(transform.analysis(maps))
             transform.adjoint_synthesis(maps)
+
+
+def _rotations(threads: int | None) -> None:
+    flm = np.zeros(BANDLIMIT**2, dtype=np.complex128)
+    rotate_flm(flm, (0.0, 1.0, 0.0), threads=threads)
 
 
 def _wigner_transforms(threads: int | None) -> None:

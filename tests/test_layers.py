@@ -24,6 +24,7 @@ LAYERS = (  # bottom to top
     {"ring_engine"},
     {"harmonics"},
     {"signals"},
+    {"rotation"},
     {"sampling"},
     {"grid_sums"},
     {"tiling"},

@@ -17,6 +17,7 @@ import numpy as np
 from spinsdw.healpix import flm_to_map, healpix_to_mw, map_to_flm, mw_to_healpix
 from spinsdw.masks import galactic_cut
 from spinsdw.polarisation import EBSeparator
+from spinsdw.rotation import rotate_flm
 from spinsdw.sampling import SAMPLINGS
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -28,6 +29,8 @@ def around(transform, coefficients):
     transform.adjoint_analysis(transform.analysis(values))
     transform.adjoint_synthesis(values)
 
+for real in (True, False):
+    rotate_flm(np.zeros((2, L * L)), (1, 2, 3), real=real)
 for sampling in SAMPLINGS:
     for spin, real in ((0, True), (0, False), (1, False), (-3, False)):
         around(
@@ -74,7 +77,7 @@ for directions in (1, 4):
 
 def test_warming_up_tells_the_seconds_of_each_path():
     seconds = warm_up(threads=2)
-    assert len(seconds) == 5
+    assert len(seconds) == 6
     assert all(value > 0 for value in seconds.values())
 
 
