@@ -21,6 +21,8 @@ __all__ = [
     "Seed",
     "gaussian_beam",
     "gaussian_flm",
+    "random_flm",
+    "random_wigner",
     "simulate_eb",
     "simulate_qu",
     "white_noise_qu",
@@ -118,6 +120,107 @@ def gaussian_flm(
         below = normal[centre - degree : centre][::-1]
         half[centre + 1 : centre + degree + 1] = (above + 1j * below) / math.sqrt(2)
     return multiply_by_degree(half + conjugate_field(half), amplitudes)
+
+
+def _complex_normal(seed: Seed, size: int) -> ComplexArray:
+    """Draw independent numbers with <|z|^2> = 1, the same first ones for every size."""
+    normal = np.random.default_rng(_sequence(seed)).standard_normal((size, 2))
+    return np.asarray(normal.view(np.complex128)[:, 0] / math.sqrt(2))
+
+
+def random_flm(
+    bandlimit: int, spin: int = 0, *, seed: Seed, spectrum: ArrayLike | None = None
+) -> ComplexArray:
+    """Draw the coefficients of a complex Gaussian field of any spin: test signals.
+
+    ``<|f_lm|^2> = C_l`` with independent real and imaginary parts and no symmetry between m and
+    -m; for a real field see `gaussian_flm`, for E and B `simulate_eb`. A larger bandlimit adds
+    small scales and keeps the rest.
+
+    Parameters
+    ----------
+    bandlimit : int
+        One more than the largest degree.
+    spin : int
+        Degrees below ``abs(spin)`` are zero.
+    seed : int, sequence of int or SeedSequence
+        Where the random numbers start.
+    spectrum : array_like, shape (at least bandlimit,), optional
+        C_l; 1 by default.
+
+    Returns
+    -------
+    ndarray, shape (bandlimit**2,), complex128
+        [(el, m) for el in range(bandlimit) for m in range(-el, el + 1)]
+
+    Raises
+    ------
+    ShapeError, DataError, ParameterError
+        As `gaussian_flm`, or if the spin is no integer.
+
+    Examples
+    --------
+    >>> flm = random_flm(8, 2, seed=1)
+    >>> int(np.count_nonzero(flm)), bool(np.all(flm[:25] == random_flm(5, 2, seed=1)))
+    (60, True)
+    """
+    bandlimit = check_integer(bandlimit, "bandlimit", minimum=1)
+    spin = check_integer(spin, "spin", remedy="2 is that of Q + iU")
+    c_l = np.ones(bandlimit) if spectrum is None else spectrum
+    amplitudes = np.sqrt(_check_spectrum(c_l, bandlimit, "spectrum"))
+    amplitudes[: abs(spin)] = 0
+    return multiply_by_degree(_complex_normal(seed, bandlimit**2), amplitudes)
+
+
+def random_wigner(
+    bandlimit: int, orders: Sequence[int], *, seed: Seed, real: bool = False
+) -> ComplexArray:
+    """Draw the coefficients of a random function on the rotation group: test signals.
+
+    Parameters
+    ----------
+    bandlimit : int
+        One more than the largest degree.
+    orders : sequence of int
+        The orders n, one row each.
+    seed : int, sequence of int or SeedSequence
+        Where the random numbers start; each order has its own stream.
+    real : bool
+        Whether the function is real, ``W_{l,-m,-n} = (-1)^(m+n) conj(W_lmn)``; the orders must
+        then be symmetric about 0.
+
+    Returns
+    -------
+    ndarray, shape (orders, bandlimit**2), complex128
+        ``<|W_lmn|^2> = 1``, independent but for the symmetry; zero below ``abs(n)``. As
+        `spinsdw.WignerTransform` takes them.
+
+    Raises
+    ------
+    ParameterError
+        If the bandlimit, an order or the seed is not valid, or a real function has orders of one
+        sign.
+
+    Examples
+    --------
+    >>> random_wigner(4, (-1, 1), seed=1, real=True).shape
+    (2, 16)
+    """
+    bandlimit = check_integer(bandlimit, "bandlimit", minimum=1)
+    rows = [check_integer(n, "orders", remedy="each is one") for n in orders]
+    if real and sorted(-n for n in rows) != sorted(rows):
+        msg = f"real=True needs orders symmetric about 0, not {tuple(rows)}; add the missing signs."
+        raise ParameterError(msg)
+    # A stream for n and one for -n, whatever other orders there are.
+    draws = [_complex_normal(_sequence(seed, abs(n), int(n < 0)), bandlimit**2) for n in rows]
+    found = np.array(draws).reshape(len(rows), bandlimit**2)
+    if real:
+        opposite = found[[rows.index(-n) for n in rows]]
+        signs = (-1.0) ** np.array(rows)[:, None]
+        found = (found + signs * conjugate_field(opposite)) / math.sqrt(2)
+    for row, n in zip(found, rows, strict=True):
+        row[: min(abs(n), bandlimit) ** 2] = 0
+    return found
 
 
 def gaussian_beam(fwhm: float, bandlimit: int) -> FloatArray:

@@ -11,10 +11,13 @@ from spinsdw.healpix import flm_to_alm, qu_to_eb_flm
 from spinsdw.simulation import (
     gaussian_beam,
     gaussian_flm,
+    random_flm,
+    random_wigner,
     simulate_eb,
     simulate_qu,
     white_noise_qu,
 )
+from spinsdw.wigner_transform import WignerTransform
 from tests.helpers import EPS, assert_close
 
 hp = pytest.importorskip("healpy")
@@ -147,3 +150,46 @@ def test_noise_has_the_level_asked_for_and_no_correlation():
 def test_noise_level_is_checked(level):
     with pytest.raises(ParameterError, match=r"uk_arcmin=.* must be finite and at least 0"):
         white_noise_qu(8, level, seed=1)
+
+
+@pytest.mark.parametrize("spin", [0, 2, -3])
+def test_random_fields_of_any_spin_have_their_spectrum(spin):
+    """|f_lm|^2 / C_l is exponential: of M modes the mean is 1 within 6 / sqrt(M)."""
+    bandlimit = 64
+    spectrum = 1 / (1.0 + np.arange(bandlimit))
+    flm = random_flm(bandlimit, spin, seed=3, spectrum=spectrum)
+    assert not flm[: spin**2].any()
+    el = np.repeat(np.arange(bandlimit), 2 * np.arange(bandlimit) + 1)
+    ratio = (np.abs(flm) ** 2 / spectrum[el])[spin**2 :]
+    assert abs(ratio.mean() - 1) < 6 / np.sqrt(ratio.size)
+    assert abs(np.mean(flm[spin**2 :] ** 2 / spectrum[el][spin**2 :])) < 6 / np.sqrt(ratio.size)
+    assert np.array_equal(flm[: 20**2], random_flm(20, spin, seed=3, spectrum=spectrum))
+
+
+@pytest.mark.parametrize(("orders", "real"), [((-2, 0, 2), True), ((-1, 1), True), ((1, 3), False)])
+def test_random_functions_of_rotations_are_what_they_say(orders, real):
+    """Unit variance at el >= |n|; a real one comes back as a real function."""
+    bandlimit = 12
+    wigner = random_wigner(bandlimit, orders, seed=2, real=real)
+    assert wigner.shape == (len(orders), bandlimit**2)
+    for row, n in zip(wigner, orders, strict=True):
+        assert not row[: n * n].any()
+        kept = np.abs(row[n * n :]) ** 2
+        assert abs(kept.mean() - 1) < 6 * np.sqrt(2 / kept.size)
+    values = WignerTransform(bandlimit, orders).synthesis(wigner)
+    assert (np.abs(values.imag).max() < 1e-13 * np.abs(values).max()) == real
+
+
+def test_orders_of_a_random_function_do_not_depend_on_each_other():
+    both = random_wigner(6, (-1, 1), seed=4)
+    assert np.array_equal(random_wigner(6, (1,), seed=4)[0], both[1])
+    assert not np.array_equal(both[0], both[1])
+
+
+def test_random_signals_name_what_is_wrong():
+    with pytest.raises(ParameterError, match="spin="):
+        random_flm(4, 1.5, seed=1)
+    with pytest.raises(ParameterError, match="real=True needs orders symmetric about 0"):
+        random_wigner(4, (0, 1), seed=1, real=True)
+    with pytest.raises(ShapeError, match="spectrum has shape"):
+        random_flm(4, seed=1, spectrum=np.ones(2))
