@@ -1,5 +1,11 @@
 import re
+import sys
 from importlib.metadata import metadata
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import feature_table
 
 _facts = metadata("spinsdw")
 project = _facts["Name"]
@@ -53,5 +59,6 @@ def _link_equations(*event):
 
 
 def setup(app):
-    """Tell Sphinx what is done to docstrings."""
+    """Tell Sphinx what is done to docstrings, and write the table of features."""
+    app.connect("builder-inited", lambda _: feature_table.write())
     app.connect("autodoc-process-docstring", _link_equations)
