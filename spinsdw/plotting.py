@@ -37,6 +37,7 @@ __all__ = [
     "plot_mollweide",
     "plot_tiling",
     "save_figure",
+    "tiling_figure",
 ]
 
 Sky: TypeAlias = "HealpixMap | ArrayLike"
@@ -285,6 +286,35 @@ def plot_tiling(axes: Axes, tiling: Tiling) -> None:
     axes.set_xlabel(r"degree $\ell$")
     axes.set_ylabel(r"$\eta(\ell)$,  $\kappa_j(\ell)$")
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def tiling_figure(tiling: Tiling) -> Figure:
+    """Make a figure of a tiling, as `plot_tiling` draws it.
+
+    Parameters
+    ----------
+    tiling : Tiling
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        To be kept with `save_figure`.
+
+    Raises
+    ------
+    MissingPackageError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> from spinsdw.tiling import SplineTiling
+    >>> len(tiling_figure(SplineTiling(64)).axes)
+    1
+    """
+    figure = _new_figure(6.4)
+    figure.set_size_inches(6.4, 3.0)
+    plot_tiling(figure.subplots(), tiling)
+    return figure
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:

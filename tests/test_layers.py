@@ -50,6 +50,9 @@ LAYERS = (  # bottom to top
     {"ensemble"},
     {"cli"},
 )
+LATE = {  # what a method hands over to a layer above when it is called, and only then
+    "spinsdw.tiling.base": {"spinsdw.plotting"},
+}
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
 
 HOMES = {  # the only parts that may import these packages
@@ -87,7 +90,7 @@ def imports(name):
             origin = "." * node.level + (node.module or "")
             members = {f"{origin}.{alias.name}" for alias in node.names}
             found |= {member if member in PATHS else origin for member in members}
-    return found
+    return found - LATE.get(name, set())
 
 
 def part(name):

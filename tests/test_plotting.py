@@ -299,6 +299,17 @@ def test_tiling_is_drawn_as_its_kernels(axes, tiling):
     axes.figure.canvas.draw()
 
 
+def test_tilings_draw_themselves(axes):
+    """On axes that are given, or on those of a new figure."""
+    tiling = ScaleDiscretisedTiling(64)
+    assert tiling.plot(axes) is axes
+    alone = tiling.plot()
+    assert alone.figure is not axes.figure
+    for one, other in zip(alone.lines, axes.lines, strict=True):
+        np.testing.assert_array_equal(one.get_data(), other.get_data())
+    alone.figure.canvas.draw()
+
+
 def test_labels_of_scales_do_not_overlap(axes):
     tiling = ScaleDiscretisedTiling(256, dilation=1.1, lowest_scale=15)
     plot_tiling(axes, tiling)

@@ -137,6 +137,37 @@ class Tiling(ABC):
         scaling, wavelets = self._held_profiles
         return float(np.max(np.abs(scaling**2 + np.sum(wavelets**2, axis=0) - 1)))
 
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the scaling function and the wavelets against the degree; see `plot_tiling`.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Ordinary axes, of pyplot or of a figure; those of a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Their ``figure`` can be kept with `plotting.save_figure`.
+
+        Raises
+        ------
+        MissingPackageError
+            matplotlib is not installed.
+
+        Examples
+        --------
+        >>> from spinsdw.tiling import NeedletTiling
+        >>> len(NeedletTiling(64).plot().lines)
+        7
+        """
+        from spinsdw.plotting import plot_tiling, tiling_figure
+
+        if axes is None:
+            return tiling_figure(self).axes[0]
+        plot_tiling(axes, self)
+        return axes
+
     def _check_scale(self, scale: int) -> int:
         scale = check_integer(scale, "scale")
         if scale not in self.scales:

@@ -9,9 +9,10 @@ import pytest
 
 from spinsdw.directionality import SteerableDirectionality
 from spinsdw.harmonics import degrees, index
-from spinsdw.tiling import NeedletTiling, ScaleDiscretisedTiling, SplineTiling
+from spinsdw.tiling import CustomTiling, NeedletTiling, ScaleDiscretisedTiling, SplineTiling
+from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wavelets import Wavelets
-from tests.helpers import assert_close, random_flm
+from tests.helpers import EPS, assert_close, random_flm, random_real_flm
 
 pys2let = pytest.importorskip("pys2let")
 
@@ -132,3 +133,41 @@ def test_splines_agree_up_to_the_numbering(switch, lowest_scale):
     # The peer's plain sum of cubes cancels: 1e-15 in the square is 1e-14 in a value of 0.05.
     assert_close(tiling.scaling_kernel**2, eta**2, ulps=64)
     assert_close(kernels(tiling) ** 2, merged**2, ulps=64)
+
+
+@pytest.mark.parametrize(("directions", "lowest_scale"), [(1, 1), (3, 1), (2, 0)])
+@pytest.mark.parametrize(("dilations", "transitions"), [((3.0, 2.0), (10,)), ((4.0, 2.0), (8,))])
+def test_hybrid_and_manual_tilings_of_the_peer_are_custom_tilings(
+    directions, lowest_scale, dilations, transitions
+):
+    """Its kernels keep our check, and its analysis with kernels by hand is ours."""
+    bandlimit = 32
+    scaling, wavelets, scaling_limit, limits, *_ = pys2let.construct_hybrid_tiling(
+        bandlimit, lowest_scale, np.array(dilations), np.array(transitions, dtype=np.int32)
+    )
+    tiling = CustomTiling(scaling, wavelets.T)
+    transform = SpinWaveletTransform(bandlimit, 0, directions, tiling=tiling, real=True)
+    flm = random_real_flm(bandlimit)
+    ours = transform.analysis_harmonic(flm)
+    peer, peer_scaling = pys2let.analysis_lm2wav_manualtiling(
+        pys2let.lm2lm_hp(flm, bandlimit),
+        bandlimit,
+        directions,
+        0,
+        scaling,
+        wavelets.T.ravel(),
+        int(scaling_limit),
+        limits,
+    )
+    atol = (16 * bandlimit + 32) * EPS * np.max(np.abs(peer))
+    np.testing.assert_allclose(ours.scaling.ravel(), peer_scaling, rtol=0, atol=atol)
+    gammas, start = 2 * directions - 1, 0
+    for scale, size in zip(ours.scales, limits, strict=True):
+        shape = (gammas, int(size), 2 * int(size) - 1)
+        values = peer[start : start + np.prod(shape)].reshape(shape)
+        start += values.size
+        assert ours[scale].shape[1:] == shape[1:]
+        for k in range(gammas):
+            steered = ours.steer(2 * np.pi * k / gammas)[scale]
+            np.testing.assert_allclose(steered, values[k], rtol=0, atol=atol)
+    assert start == peer.size
