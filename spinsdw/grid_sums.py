@@ -28,6 +28,8 @@ Array = np.ndarray[Any, Any]
 # so few rings that columns are read in pieces shorter than a few cache lines.
 _TASK_BYTES = 2**19
 _FEWEST_RINGS = 16
+# Such batches that a thread has at a time, while circles are shifted.
+_SCRATCH_ARRAYS = 4
 
 
 @functools.lru_cache(maxsize=64)
@@ -88,6 +90,24 @@ class GridSums:
     def workspace_size(self) -> int:
         """Complex numbers that hold the Fourier columns of all outputs."""
         return max(self.mixing.shape) * self._n_m * self.sampling.n_rings
+
+    @property
+    def scratch_bytes(self) -> int:
+        """Bytes that a call takes beyond its input, output and workspace."""
+        circle = 16 * self.sampling.n_phi * len(self.orders)
+        batches = self._threads * max(_TASK_BYTES, circle)
+        circles = (self._n_m + 1) // 2 * circle
+        return _SCRATCH_ARRAYS * min(batches, circles)
+
+    @property
+    def working_bytes(self) -> int:
+        """Bytes that a call takes beyond its input and output."""
+        return 16 * self.workspace_size + self.scratch_bytes
+
+    @property
+    def maps_itemsize(self) -> int:
+        """Bytes of one number of the output maps."""
+        return np.dtype(self.maps_dtype).itemsize
 
     @property
     def maps_dtype(self) -> type[np.generic]:

@@ -9,6 +9,7 @@ n to gamma. Of a real signal only n >= 0 is summed: the map of -n is the conjuga
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -63,6 +64,20 @@ class OrientationSums:
         return max((sums.workspace_size for sums, *_ in self._groups()), default=0)
 
     @property
+    def scratch_bytes(self) -> int:
+        """Bytes that a call takes beyond its input, output and workspace."""
+        groups = [
+            sums.scratch_bytes + 16 * math.prod(sums.maps_shape) for sums, *_ in self._groups()
+        ]
+        # The maps of the orders; `to_grid` puts complex ones in the output itself.
+        return max(groups, default=0) + 16 * math.prod(self._spectrum_shape)
+
+    @property
+    def maps_itemsize(self) -> int:
+        """Bytes of one number of the output maps."""
+        return np.dtype(self.maps_dtype).itemsize
+
+    @property
     def maps_dtype(self) -> type[np.generic]:
         """Type of the output maps."""
         return np.float64 if self.real else np.complex128
@@ -89,10 +104,10 @@ class OrientationSums:
             )
             yield sums, rows, places
 
-    def _spectrum(self) -> Array:
+    @property
+    def _spectrum_shape(self) -> tuple[int, int, int]:
         count = self.orientations.count
-        shape = (count // 2 + 1 if self.real else count, *self.sampling.shape)
-        return np.empty(shape, dtype=np.complex128)
+        return (count // 2 + 1 if self.real else count, *self.sampling.shape)
 
     def _share_rings(self, call: Callable[[slice], None]) -> None:
         threads = threads_for(self.sampling.bandlimit, self.threads)
@@ -112,7 +127,7 @@ class OrientationSums:
     ) -> Array:
         """Return maps, shape (orientations, rings, phi); as `GridSums.to_grid`."""
         maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
-        spectrum = self._spectrum() if self.real else maps
+        spectrum = np.empty(self._spectrum_shape, dtype=np.complex128) if self.real else maps
         spectrum[...] = 0.0
         if self.real:
             flm = flm.copy()
@@ -134,7 +149,7 @@ class OrientationSums:
         quadrature: bool = False,
     ) -> None:
         """Add to ``out`` (1, L*L) the adjoint sum of `to_grid`; as `GridSums.from_grid`."""
-        spectrum = self._spectrum()
+        spectrum = np.empty(self._spectrum_shape, dtype=np.complex128)
         self._share_rings(lambda ring: to_orders(maps[:, ring], spectrum[:, ring]))
         target = np.zeros_like(out) if self.real else out
         if self.real:

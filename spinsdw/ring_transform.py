@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
@@ -12,7 +13,8 @@ import numpy as np
 from spinsdw.errors import ParameterError
 from spinsdw.fourier import from_series, to_series
 from spinsdw.grid_sums import fill_negative_orders
-from spinsdw.harmonics import check_bandlimit, check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
+from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.parallel import resolve_threads, run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.healpix_rings import HealpixRings
@@ -104,6 +106,9 @@ class HealpixTransform:
         Whether maps are real (spin 0 only).
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
+    max_memory : int, optional
+        Bytes that a call may take by `memory_estimate`; one that would take more is refused before
+        it allocates anything. No limit when None.
 
     Examples
     --------
@@ -119,8 +124,9 @@ class HealpixTransform:
     spin: int = 0
     real: bool = False
     threads: int | None = None
+    max_memory: int | None = None
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what describes a transform
         self,
         nside: int,
         bandlimit: int,
@@ -128,6 +134,7 @@ class HealpixTransform:
         *,
         real: bool = False,
         threads: int | None = None,
+        max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         spin = check_spin(spin, bandlimit)
@@ -136,7 +143,8 @@ class HealpixTransform:
             msg = f"real=True needs spin 0, not spin={spin}; a signal with spin is complex."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (HealpixRings(nside).nside, bandlimit, spin, real, threads)
+        budget = check_max_memory(max_memory)
+        values = (HealpixRings(nside).nside, bandlimit, spin, real, threads, budget)
         for field, value in zip(fields(self), values, strict=True):
             object.__setattr__(self, field.name, value)
 
@@ -166,9 +174,53 @@ class HealpixTransform:
         sides = 1 if self.real else 2
         return OrderSums((-self.spin,), self._weights, 0, sides, self._threads)
 
-    def _columns(self) -> Array:
+    @property
+    def _columns_shape(self) -> tuple[int, int, int]:
         n_m = self.bandlimit if self.real else 2 * self.bandlimit - 1
-        return np.empty((1, n_m, self.rings.n_rings), dtype=np.complex128)
+        return (1, n_m, self.rings.n_rings)
+
+    @property
+    def _maps_dtype(self) -> type[np.generic]:
+        return np.float64 if self.real else np.complex128
+
+    def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
+        """Return the bytes that one call of each method takes.
+
+        Parameters
+        ----------
+        batch : int, default 1
+            Signals handed over in one call.
+
+        Returns
+        -------
+        dict of str to MemoryEstimate
+            By the name of the method.
+
+        Raises
+        ------
+        ParameterError
+            If ``batch`` is not an integer of at least 0.
+
+        Examples
+        --------
+        >>> found = HealpixTransform(512, 1024, 2).memory_estimate()["synthesis"]
+        >>> found.input == 16 * 1024**2, found.output == 16 * 12 * 512**2
+        (True, True)
+        """
+        batch = check_integer(batch, "batch", minimum=0)
+        flm = batch * 16 * self.bandlimit**2
+        maps = batch * self.rings.n_pixels * np.dtype(self._maps_dtype).itemsize
+        # A thread folds a few rings at a time, each with the phases of its orders.
+        folded = 16 * _BLOCK_RINGS * (4 * self.nside + self.bandlimit)
+        working = 16 * math.prod(self._columns_shape) + self._threads * folded
+        return {
+            "synthesis": MemoryEstimate(flm, maps, working),
+            "adjoint_synthesis": MemoryEstimate(maps, flm, working),
+        }
+
+    def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:
+        if self.max_memory is not None:
+            self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
 
     def _share_rings(self, call: Callable[[_RingBlock], None]) -> None:
         rings = self.rings
@@ -182,17 +234,14 @@ class HealpixTransform:
         tasks = [functools.partial(call, block) for block in blocks]
         run_tasks(tasks, self._threads)
 
-    def _to_map(self, flm: Array) -> Array:
-        columns = self._columns()
+    def _fill_map(self, flm: Array, pixels: Array) -> None:
+        columns = np.empty(self._columns_shape, dtype=np.complex128)
         one = np.ones((1, 1), dtype=np.complex128)
         _engine(self.nside, self.bandlimit).fill_columns(flm[None], self._sums, one, columns)
-        dtype = np.float64 if self.real else np.complex128
-        pixels = np.empty(self.rings.n_pixels, dtype=dtype)
         self._share_rings(lambda block: block.fill_pixels(self.bandlimit, columns[0], pixels))
-        return pixels
 
     def _to_coefficients(self, pixels: Array, flm: Array) -> None:
-        columns = self._columns()
+        columns = np.empty(self._columns_shape, dtype=np.complex128)
         self._share_rings(lambda block: block.fill_columns(self.bandlimit, pixels, columns[0]))
         _engine(self.nside, self.bandlimit).add_to_harmonics(columns, self._sums, flm[None])
 
@@ -216,14 +265,15 @@ class HealpixTransform:
             If the last axis is not bandlimit**2 long.
         DataError
             If a coefficient is not a finite number.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
+        self._check_memory("synthesis", np.shape(flm)[:-1])
         flm = writable(check_flm(flm, self.bandlimit))
-        if flm.ndim == 1:
-            return self._to_map(flm)
         batch = flm.reshape(-1, flm.shape[-1])
-        maps = np.empty((len(batch), *self.shape), np.float64 if self.real else np.complex128)
+        maps = np.empty((len(batch), *self.shape), dtype=self._maps_dtype)
         for one, out in zip(batch, maps, strict=True):
-            out[...] = self._to_map(one)
+            self._fill_map(one, out)
         return maps.reshape(*flm.shape[:-1], *self.shape)
 
     def adjoint_synthesis(self, maps: Array) -> Array:
@@ -245,7 +295,10 @@ class HealpixTransform:
             If the last axis is not 12 nside^2 long.
         DataError
             If a value is not a finite number, or is complex with ``real``.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
+        self._check_memory("adjoint_synthesis", np.shape(maps)[:-1])
         maps = check_map(maps, self.shape, real=self.real)
         rows = maps.reshape(-1, self.rings.n_pixels)
         flm = np.zeros((rows.shape[0], self.bandlimit**2), dtype=np.complex128)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from spinsdw.errors import ParameterError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_bandlimit, check_flm
+from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
+from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, check_spin, writable
@@ -40,6 +41,9 @@ class SpinHarmonicTransform:
         Whether maps are real (spin 0 only): half the work and half the memory.
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
+    max_memory : int, optional
+        Bytes that a call may take by `memory_estimate`; one that would take more is refused before
+        it allocates anything. No limit when None.
 
     Notes
     -----
@@ -62,8 +66,9 @@ class SpinHarmonicTransform:
     sampling: Sampling | str = "mw"
     real: bool = False
     threads: int | None = None
+    max_memory: int | None = None
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what describes a transform
         self,
         bandlimit: int,
         spin: int = 0,
@@ -71,6 +76,7 @@ class SpinHarmonicTransform:
         sampling: str | Sampling = "mw",
         real: bool = False,
         threads: int | None = None,
+        max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         spin = check_spin(spin, bandlimit)
@@ -79,7 +85,8 @@ class SpinHarmonicTransform:
             msg = f"real=True needs spin 0, not spin={spin}; a signal with spin is complex."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (bandlimit, spin, resolve_sampling(sampling, bandlimit), real, threads)
+        budget = check_max_memory(max_memory)
+        values = (bandlimit, spin, resolve_sampling(sampling, bandlimit), real, threads, budget)
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
@@ -104,21 +111,59 @@ class SpinHarmonicTransform:
         one = np.ones((1, 1), dtype=np.complex128)
         return GridSums(self._grid, (-self.spin,), one, self.real, resolve_threads(self.threads))
 
+    def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
+        """Return the bytes that one call of each method takes.
+
+        Parameters
+        ----------
+        batch : int, default 1
+            Signals handed over in one call.
+
+        Returns
+        -------
+        dict of str to MemoryEstimate
+            By the name of the method.
+
+        Raises
+        ------
+        ParameterError
+            If ``batch`` is not an integer of at least 0.
+
+        Examples
+        --------
+        >>> found = SpinHarmonicTransform(2048, spin=2).memory_estimate()["synthesis"]
+        >>> found.input == 16 * 2048**2, found.output == 16 * 2048 * 4095
+        (True, True)
+        >>> found.peak < 2 * (found.input + found.output)
+        True
+        """
+        batch = check_integer(batch, "batch", minimum=0)
+        flm = batch * 16 * self.bandlimit**2
+        maps = batch * math.prod(self.shape) * self._sums.maps_itemsize
+        working = self._sums.working_bytes
+        there, back = MemoryEstimate(flm, maps, working), MemoryEstimate(maps, flm, working)
+        return {
+            "synthesis": there,
+            "analysis": back,
+            "adjoint_synthesis": back,
+            "adjoint_analysis": there,
+        }
+
+    def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:
+        if self.max_memory is not None:
+            self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
+
     def _to_maps(self, flm: Array, *, quadrature: bool) -> Array:
+        self._check_memory("adjoint_analysis" if quadrature else "synthesis", np.shape(flm)[:-1])
         flm = writable(check_flm(flm, self.bandlimit))
-        call: Callable[[Array], Array] = lambda one: self._sums.to_grid(  # noqa: E731
-            one[None], self._weights, quadrature=quadrature
-        )[0]
-        if flm.ndim == 1:
-            return call(flm)
         batch = flm.reshape(-1, flm.shape[-1])
-        dtype = np.float64 if self.real else np.complex128
-        maps = np.empty((batch.shape[0], *self.shape), dtype=dtype)
+        maps = np.empty((batch.shape[0], *self.shape), dtype=self._sums.maps_dtype)
         for one, out in zip(batch, maps, strict=True):
-            out[...] = call(one)
+            self._sums.to_grid(one[None], self._weights, quadrature=quadrature, out=out[None])
         return maps.reshape(*flm.shape[:-1], *self.shape)
 
     def _to_coefficients(self, maps: Array, *, quadrature: bool) -> Array:
+        self._check_memory("analysis" if quadrature else "adjoint_synthesis", np.shape(maps)[:-2])
         maps = check_map(maps, self.shape, real=self.real)
         batch = maps.reshape(-1, *self.shape)
         flm = np.zeros((batch.shape[0], self.bandlimit**2), dtype=np.complex128)
@@ -148,6 +193,8 @@ class SpinHarmonicTransform:
             If the last axis is not bandlimit**2 long.
         DataError
             If a coefficient is not a finite number.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
         return self._to_maps(flm, quadrature=False)
 
@@ -170,6 +217,8 @@ class SpinHarmonicTransform:
             If the last two axes are not the grid's.
         DataError
             If a value is not a finite number, or is complex with ``real``.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
         return self._to_coefficients(maps, quadrature=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import math
 import warnings
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -15,7 +16,8 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality, Orientations, SteerableDirectionality
 from spinsdw.errors import ParameterError, PrecisionWarning, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_bandlimit, check_flm, resize
+from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
+from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.orientation_sums import OrientationSums
 from spinsdw.parallel import resolve_threads
 from spinsdw.ring_transform import HealpixTransform
@@ -142,6 +144,9 @@ class SpinWaveletTransform:
         of -r, its inverse. S2LET synthesises with the same r: that is a transform of -r.
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
+    max_memory : int, optional
+        Bytes that a call may take by `memory_estimate`; one that would take more is refused before
+        it allocates anything. No limit when None.
 
     Notes
     -----
@@ -174,6 +179,7 @@ class SpinWaveletTransform:
     directionality: Directionality | None = None
     original_spin: int = 0
     threads: int | None = None
+    max_memory: int | None = None
 
     def __init__(  # noqa: PLR0913 - the parameters of the wavelets
         self,
@@ -190,6 +196,7 @@ class SpinWaveletTransform:
         directionality: Directionality | None = None,
         original_spin: int = 0,
         threads: int | None = None,
+        max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         grid = resolve_sampling(sampling, bandlimit)
@@ -201,7 +208,9 @@ class SpinWaveletTransform:
             original_spin=original_spin,
         )
         # Checks spin, real and threads.
-        harmonic = SpinHarmonicTransform(bandlimit, spin, sampling=grid, real=real, threads=threads)
+        harmonic = SpinHarmonicTransform(
+            bandlimit, spin, sampling=grid, real=real, threads=threads, max_memory=max_memory
+        )
         values = (
             bandlimit,
             harmonic.spin,
@@ -215,6 +224,7 @@ class SpinWaveletTransform:
             wavelets.directionality,
             wavelets.original_spin,
             threads,
+            check_max_memory(max_memory),
         )
         for field, value in zip(fields(self), values, strict=True):
             object.__setattr__(self, field.name, value)
@@ -368,6 +378,11 @@ class SpinWaveletTransform:
                 sums.to_grid(one[None, :size], weights, lowest=lowest, quadrature=adjoint, out=out)
         return maps.reshape(*flm.shape[:-1], *self.shapes[scale])
 
+    def _add_scales(self, values: dict[int, Array], flm: Array, *, adjoint: bool) -> None:
+        workspace = self._workspace()
+        for j, one in values.items():
+            self._add_scale(one, j, flm, workspace, adjoint=adjoint)
+
     def _add_scale(
         self, values: Array, scale: int, flm: Array, workspace: Array, *, adjoint: bool
     ) -> None:
@@ -381,14 +396,79 @@ class SpinWaveletTransform:
                 one, weights, out=out[None, :size], lowest=lowest, quadrature=not adjoint
             )
 
+    def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
+        """Return the bytes that one call of each method takes.
+
+        Parameters
+        ----------
+        batch : int, default 1
+            Signals handed over in one call.
+
+        Returns
+        -------
+        dict of str to MemoryEstimate
+            By the name of the method.
+
+        Raises
+        ------
+        ParameterError
+            If ``batch`` is not an integer of at least 0.
+
+        Examples
+        --------
+        >>> found = SpinWaveletTransform(2048, 2, 5).memory_estimate()["analysis_harmonic"]
+        >>> found.peak < 1.5 * (found.input + found.output)
+        True
+        """
+        batch = check_integer(batch, "batch", minimum=0)
+        flm = batch * 16 * self.bandlimit**2
+        maps = self.harmonic.memory_estimate(batch)
+        sums = [sums for sums, *_ in self._scale_sums.values()]
+        wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
+        scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
+        room = 16 * max(one.workspace_size for one in sums)
+        working = room + max(one.scratch_bytes for one in sums)
+        # The scaling part has coefficients of its own: on the way there before any scale has.
+        part = scaling.input + scaling.working
+        there = MemoryEstimate(flm, scaling.output + wavelets, max(working, part - wavelets))
+        back = MemoryEstimate(there.output, flm, max(working, part))
+        return {
+            "analysis_harmonic": there,
+            "synthesis_harmonic": back,
+            "adjoint_analysis_harmonic": back,
+            "adjoint_synthesis_harmonic": there,
+            "analysis": maps["analysis"].then(there),
+            "synthesis": back.then(maps["synthesis"]),
+            "adjoint_analysis": back.then(maps["adjoint_analysis"]),
+            "adjoint_synthesis": maps["adjoint_synthesis"].then(there),
+        }
+
+    def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:
+        if self.max_memory is not None:
+            self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
+
+    def _check_coefficients(self, call: str, coefficients: WaveletCoefficients) -> None:
+        if isinstance(coefficients, WaveletCoefficients):
+            self._check_memory(call, coefficients.scaling.shape[:-2])
+
+    def _scaling_to_grid(self, flm: Array, *, adjoint: bool) -> Array:
+        factor = self._scaling_factors[1 if adjoint else 0]
+        part = flm[..., : factor.size] * factor
+        part[..., : self.spin**2] = 0.0
+        transform = self._scaling_transform
+        return transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
+
+    def _add_scaling(self, scaling: Array, flm: Array, *, adjoint: bool) -> None:
+        transform = self._scaling_transform
+        part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
+        part *= self._scaling_factors[0 if adjoint else 1]
+        flm[..., : part.shape[-1]] += part
+
     def _decompose(
         self, flm_of: Callable[[int | str], Array], *, adjoint: bool
     ) -> WaveletCoefficients:
         """Analyse every part, each from the harmonic coefficients ``flm_of`` gives for it."""
-        factor = self._scaling_factors[1 if adjoint else 0]
-        part = flm_of("scaling")[..., : factor.size] * factor
-        transform = self._scaling_transform
-        scaling = transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
+        scaling = self._scaling_to_grid(flm_of("scaling"), adjoint=adjoint)
         workspace = self._workspace()
         wavelets = {
             j: self._scale_to_grid(flm_of(j), j, workspace, adjoint=adjoint) for j in self.scales
@@ -407,16 +487,13 @@ class SpinWaveletTransform:
         wanted = set(self.shapes) if parts is None else self._checked_parts(parts)
         flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
-        workspace = self._workspace()
-        for j in self.scales:
-            if j in wanted:
-                self._add_scale(checked[j], j, rows, workspace, adjoint=adjoint)
+        self._add_scales({j: checked[j] for j in self.scales if j in wanted}, rows, adjoint=adjoint)
         if self.real:
             fill_negative_orders(rows)
         if "scaling" in wanted:
-            transform = self._scaling_transform
-            part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
-            flm[..., : part.shape[-1]] += part * self._scaling_factors[0 if adjoint else 1]
+            self._add_scaling(scaling, flm, adjoint=adjoint)
+        # A signal of spin s has no degrees below |s|.
+        flm[..., : self.spin**2] = 0.0
         return flm
 
     def _checked_parts(self, parts: Collection[int | str]) -> set[int | str]:
@@ -510,8 +587,11 @@ class SpinWaveletTransform:
             If the last axis is not bandlimit**2 long.
         DataError
             If a coefficient is not a finite number.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
-        flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
+        self._check_memory("analysis_harmonic", np.shape(flm)[:-1])
+        flm = writable(check_flm(flm, self.bandlimit))
         self._warn_of_lost_degrees(flm)
         return self._decompose(lambda _: flm, adjoint=False)
 
@@ -556,10 +636,7 @@ class SpinWaveletTransform:
             )
             raise ParameterError(msg)
         # Parts that share an array are checked once.
-        checked = {
-            id(flm): self._spin_part(writable(check_flm(flm, self.bandlimit)))
-            for flm in flms.values()
-        }
+        checked = {id(flm): writable(check_flm(flm, self.bandlimit)) for flm in flms.values()}
         return self._decompose(lambda key: checked[id(flms[key])], adjoint=False)
 
     def synthesis_harmonic(
@@ -592,16 +669,21 @@ class SpinWaveletTransform:
             If a value is not a finite number, or is complex with ``real``.
         ParameterError
             If the parameters are those of other wavelets, or a part is not known.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
-        return self._spin_part(self._recompose(coefficients, adjoint=False, parts=parts))
+        self._check_coefficients("synthesis_harmonic", coefficients)
+        return self._recompose(coefficients, adjoint=False, parts=parts)
 
     def adjoint_analysis_harmonic(self, coefficients: WaveletCoefficients) -> Array:
         """Apply the adjoint of `analysis_harmonic`; shapes of `synthesis_harmonic`."""
-        return self._spin_part(self._recompose(coefficients, adjoint=True))
+        self._check_coefficients("adjoint_analysis_harmonic", coefficients)
+        return self._recompose(coefficients, adjoint=True)
 
     def adjoint_synthesis_harmonic(self, flm: Array) -> WaveletCoefficients:
         """Apply the adjoint of `synthesis_harmonic`; shapes of `analysis_harmonic`."""
-        flm = self._spin_part(writable(check_flm(flm, self.bandlimit)))
+        self._check_memory("adjoint_synthesis_harmonic", np.shape(flm)[:-1])
+        flm = writable(check_flm(flm, self.bandlimit))
         return self._decompose(lambda _: flm, adjoint=True)
 
     def analysis_wigner(self, flm: Array) -> dict[int | str, Array]:
@@ -818,7 +900,9 @@ class SpinWaveletTransform:
             return
         flm = check_flm(flm, self.bandlimit)
         is_lost = np.repeat(lost, 2 * np.arange(self.bandlimit) + 1)
-        power, all_power = np.sum(np.abs(flm[..., is_lost]) ** 2), np.sum(np.abs(flm) ** 2)
+        is_lost[: self.spin**2] = False
+        power = np.sum(np.abs(flm[..., is_lost]) ** 2)
+        all_power = np.sum(np.abs(flm[..., self.spin**2 :]) ** 2)
         if power > (64 * self.bandlimit * np.finfo(float).eps) ** 2 * all_power:
             msg = (
                 f"{power / all_power:.3g} of the signal's power is in degrees that "
@@ -839,16 +923,20 @@ class SpinWaveletTransform:
 
     def analysis(self, maps: Array) -> WaveletCoefficients:
         """Compute coefficients from maps, shape (..., rings, phi); see `analysis_harmonic`."""
+        self._check_memory("analysis", np.shape(maps)[:-2])
         return self.analysis_harmonic(self.harmonic.analysis(maps))
 
     def synthesis(self, coefficients: WaveletCoefficients) -> Array:
         """Compute maps, shape (..., rings, phi), from wavelet coefficients: inverts `analysis`."""
+        self._check_coefficients("synthesis", coefficients)
         return self.harmonic.synthesis(self.synthesis_harmonic(coefficients))
 
     def adjoint_analysis(self, coefficients: WaveletCoefficients) -> Array:
         """Apply the adjoint of `analysis`: coefficients to maps."""
+        self._check_coefficients("adjoint_analysis", coefficients)
         return self.harmonic.adjoint_analysis(self.adjoint_analysis_harmonic(coefficients))
 
     def adjoint_synthesis(self, maps: Array) -> WaveletCoefficients:
         """Apply the adjoint of `synthesis`: maps to coefficients."""
+        self._check_memory("adjoint_synthesis", np.shape(maps)[:-2])
         return self.adjoint_synthesis_harmonic(self.harmonic.adjoint_synthesis(maps))

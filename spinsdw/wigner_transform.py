@@ -12,6 +12,7 @@ import numpy as np
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
+from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, writable
@@ -56,6 +57,9 @@ class WignerTransform:
         Whether functions are real; the orders must then be symmetric about 0.
     threads : int, optional
         Threads to use; all cores when None.
+    max_memory : int, optional
+        Bytes that a call may take by `memory_estimate`; one that would take more is refused before
+        it allocates anything. No limit when None.
 
     Notes
     -----
@@ -79,8 +83,9 @@ class WignerTransform:
     sampling: Sampling | str = "mw"
     real: bool = False
     threads: int | None = None
+    max_memory: int | None = None
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what describes a transform
         self,
         bandlimit: int,
         orders: Sequence[int],
@@ -88,6 +93,7 @@ class WignerTransform:
         sampling: str | Sampling = "mw",
         real: bool = False,
         threads: int | None = None,
+        max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         checked = _check_orders(orders, bandlimit)
@@ -96,7 +102,8 @@ class WignerTransform:
             msg = f"real=True needs orders symmetric about 0, not {checked}; add the missing signs."
             raise ParameterError(msg)
         resolve_threads(threads)
-        values = (bandlimit, checked, resolve_sampling(sampling, bandlimit), real, threads)
+        budget = check_max_memory(max_memory)
+        values = (bandlimit, checked, resolve_sampling(sampling, bandlimit), real, threads, budget)
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
@@ -135,7 +142,50 @@ class WignerTransform:
     def _analysis_weights(self) -> Array:
         return self._weights(np.full(self.bandlimit, 2 * np.pi / self.gammas.size))
 
+    def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
+        """Return the bytes that one call of each method takes.
+
+        Parameters
+        ----------
+        batch : int, default 1
+            Functions handed over in one call.
+
+        Returns
+        -------
+        dict of str to MemoryEstimate
+            By the name of the method.
+
+        Raises
+        ------
+        ParameterError
+            If ``batch`` is not an integer of at least 0.
+
+        Examples
+        --------
+        >>> found = WignerTransform(512, orders=(-2, 0, 2)).memory_estimate()["analysis"]
+        >>> found.input == 16 * 3 * 512 * 1023, found.output == 16 * 3 * 512**2
+        (True, True)
+        """
+        batch = check_integer(batch, "batch", minimum=0)
+        sums = self._sums
+        coefficients = batch * 16 * len(self.orders) * self.bandlimit**2
+        functions = batch * math.prod(self.shape) * sums.maps_itemsize
+        there = MemoryEstimate(coefficients, functions, sums.working_bytes)
+        back = MemoryEstimate(functions, coefficients, sums.working_bytes)
+        return {
+            "synthesis": there,
+            "analysis": back,
+            "adjoint_synthesis": back,
+            "adjoint_analysis": there,
+        }
+
+    def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:
+        if self.max_memory is not None:
+            self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
+
     def _to_functions(self, coefficients: Array, weights: Array, *, quadrature: bool) -> Array:
+        call = "adjoint_analysis" if quadrature else "synthesis"
+        self._check_memory(call, np.shape(coefficients)[:-2])
         values = writable(check_flm(coefficients, self.bandlimit, "coefficients"))
         expected = (len(self.orders), self.bandlimit**2)
         if values.shape[-2:] != expected:
@@ -145,36 +195,37 @@ class WignerTransform:
             )
             raise ShapeError(msg)
         batch = values.reshape(-1, *expected)
-        dtype = np.float64 if self.real else np.complex128
-        maps = np.empty((batch.shape[0], *self.shape), dtype=dtype)
+        maps = np.empty((batch.shape[0], *self.shape), dtype=self._sums.maps_dtype)
         for one, out in zip(batch, maps, strict=True):
-            out[...] = self._sums.to_grid(one, weights, quadrature=quadrature)
+            self._sums.to_grid(one, weights, quadrature=quadrature, out=out)
         return maps.reshape(*values.shape[:-2], *self.shape)
 
     def _to_coefficients(self, functions: Array, weights: Array, *, quadrature: bool) -> Array:
+        call = "analysis" if quadrature else "adjoint_synthesis"
+        self._check_memory(call, np.shape(functions)[:-3])
         values = check_map(functions, self.shape, real=self.real, name="function")
         batch = values.reshape(-1, *self.shape)
         size = (batch.shape[0], len(self.orders), self.bandlimit**2)
         found = np.zeros(size, dtype=np.complex128)
         for one, out in zip(batch, found, strict=True):
             self._sums.from_grid(one, weights, out=out, quadrature=quadrature)
-        if self.real:
-            self._fill_negative(found)
+            if self.real:
+                self._fill_negative(out)
         return found.reshape(*values.shape[:-3], *size[1:])
 
     def _fill_negative(self, found: Array) -> None:
         """W_{l,-m,-n} = (-1)^(m+n) conj(W_lmn) of a real function."""
         el = np.arange(self.bandlimit)
-        opposite = found[:, ::-1].copy()
-        signs = (-1.0) ** np.array(self.orders)[None, :, None]
+        opposite = found[::-1].copy()
+        signs = (-1.0) ** np.array(self.orders)[:, None]
         for m in range(1, self.bandlimit):
             base = el[m:] ** 2 + el[m:]
             found[..., base - m] = (-1.0) ** m * signs * opposite[..., base + m].conj()
         # Of order m = 0, those of n < 0 follow from those of n > 0, and n = 0 is its own opposite.
         zero, middle = el**2 + el, len(self.orders) // 2
-        found[:, :middle, zero] = (signs * opposite[..., zero].conj())[:, :middle]
+        found[:middle, zero] = (signs * opposite[:, zero].conj())[:middle]
         if 0 in self.orders:
-            found.imag[:, middle, zero] = 0.0
+            found.imag[middle, zero] = 0.0
 
     def synthesis(self, coefficients: Array) -> Array:
         """Compute functions from Wigner coefficients.
@@ -196,6 +247,8 @@ class WignerTransform:
             If the last two axes have other lengths.
         DataError
             If a coefficient is not a finite number.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
         return self._to_functions(coefficients, self._synthesis_weights, quadrature=False)
 
@@ -218,6 +271,8 @@ class WignerTransform:
             If the last three axes are not the grid's.
         DataError
             If a value is not a finite number, or is complex with ``real``.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
         """
         return self._to_coefficients(functions, self._analysis_weights, quadrature=True)
 

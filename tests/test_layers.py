@@ -17,6 +17,7 @@ PACKAGE = Path(__file__).parents[1] / "spinsdw"
 LAYERS = (  # bottom to top
     {"compiled"},
     {"errors"},
+    {"memory"},
     {"files"},
     {"datasets"},
     {"fourier"},
