@@ -13,8 +13,10 @@ import numpy as np
 __all__ = [
     "fill_maps",
     "fill_maps_columns",
+    "from_modes",
     "from_orders",
     "from_series",
+    "to_modes",
     "to_orders",
     "to_series",
 ]
@@ -56,6 +58,40 @@ def from_orders(spectrum: Array, out: Array) -> None:
 def to_orders(values: Array, out: Array) -> None:
     """Fill ``out[n, ...] = sum_k values[k, ...] exp(-2 pi i n k / K)``; as `to_series`."""
     _forward(values, out, 0)
+
+
+def from_modes(modes: Array, points: Array, accuracy: float, threads: int) -> Array:
+    """Return ``sum_jk modes[j, k] exp(i (j x_p + k y_p))`` at any points, by a non-uniform FFT.
+
+    modes: complex128, j and k counted modulo the sizes, the larger half negative; points: float64,
+    shape (n, 2); the error relative to the root of the sum of squares is about ``accuracy``.
+    """
+    import ducc0
+
+    found: Array = ducc0.nufft.u2nu(
+        grid=modes,
+        coord=points,
+        forward=False,
+        epsilon=accuracy,
+        nthreads=threads,
+        fft_order=True,
+    )
+    return found
+
+
+def to_modes(values: Array, points: Array, out: Array, accuracy: float, threads: int) -> None:
+    """Fill ``out[j, k] = sum_p values[p] exp(-i (j x_p + k y_p))``, the adjoint of `from_modes`."""
+    import ducc0
+
+    ducc0.nufft.nu2u(
+        points=values,
+        coord=points,
+        forward=True,
+        epsilon=accuracy,
+        nthreads=threads,
+        out=out,
+        fft_order=True,
+    )
 
 
 def _backward(series: Array, out: Array, axis: int) -> None:

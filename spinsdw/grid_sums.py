@@ -20,7 +20,7 @@ from spinsdw.parallel import run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
 
-__all__ = ["GridSums", "fill_negative_orders"]
+__all__ = ["GridSums", "engine_of", "fill_negative_orders"]
 
 Array = np.ndarray[Any, Any]
 
@@ -33,7 +33,8 @@ _SCRATCH_ARRAYS = 4
 
 
 @functools.lru_cache(maxsize=64)
-def _engine(sampling: Sampling) -> RingEngine:
+def engine_of(sampling: Sampling) -> RingEngine:
+    """Return the sums over degree on the rings of a sampling."""
     rings = sampling.colatitudes
     if sampling.is_symmetric:
         return RingEngine(sampling.bandlimit, rings[: (rings.size + 1) // 2], symmetric=True)
@@ -163,7 +164,7 @@ class GridSums:
         ``out`` where it is given.
         """
         columns = self._columns()
-        engine, sums = _engine(self.sampling), self._order_sums(weights, lowest)
+        engine, sums = engine_of(self.sampling), self._order_sums(weights, lowest)
         if quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
             engine.fill_columns(flm, sums, identity, columns)
@@ -203,4 +204,4 @@ class GridSums:
             )
         elif not np.array_equal(unmixing, [[1.0]]):
             self._mix(unmixing, columns)
-        _engine(self.sampling).add_to_harmonics(columns, self._order_sums(weights, lowest), out)
+        engine_of(self.sampling).add_to_harmonics(columns, self._order_sums(weights, lowest), out)

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from spinsdw.errors import ParameterError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
-from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
+from spinsdw.harmonics import (
+    check_bandlimit,
+    check_flm,
+    check_integer,
+    lower_spin,
+    raise_spin,
+    resize,
+)
 from spinsdw.memory import MemoryEstimate, check_max_memory
-from spinsdw.parallel import resolve_threads
+from spinsdw.parallel import resolve_threads, threads_for
+from spinsdw.point_sums import PointSums, check_accuracy, check_points
+from spinsdw.ring_engine import OrderSums
+from spinsdw.rotation import rotate_flm
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, check_spin, writable
 
@@ -229,3 +241,205 @@ class SpinHarmonicTransform:
     def adjoint_analysis(self, flm: Array) -> Array:
         """Apply the adjoint of `analysis` to coefficients; shapes and errors of `synthesis`."""
         return self._to_maps(flm, quadrature=True)
+
+    def _point_sums(self, theta: Array, phi: Array, accuracy: float) -> PointSums:
+        sides, threads = 1 if self.real else 2, resolve_threads(self.threads)
+        threads = threads_for(self.bandlimit, threads)
+        sums = OrderSums((-self.spin,), self._weights, 0, sides, threads)
+        return PointSums(sums, theta.ravel(), phi.ravel(), check_accuracy(accuracy))
+
+    def _check_point_memory(self, sums: PointSums, batch: int, call: str) -> None:
+        flm, values = 16 * batch * self.bandlimit**2, batch * sums.values_bytes
+        there = (flm, values) if call == "synthesis_at" else (values, flm)
+        MemoryEstimate(*there, sums.working_bytes).require(self.max_memory, call)
+
+    def synthesis_at(
+        self,
+        flm: Array,
+        colatitudes: ArrayLike,
+        longitudes: ArrayLike,
+        *,
+        accuracy: float = 1e-12,
+    ) -> Array:
+        """Evaluate signals at arbitrary points.
+
+        Parameters
+        ----------
+        flm : ndarray, shape (..., bandlimit**2), complex
+            As in `synthesis`.
+        colatitudes, longitudes : array_like, broadcast to one shape
+            The points, in radians; 0 <= colatitude <= pi.
+        accuracy : float, default 1e-12
+            Error, relative to the root of the mean square of the signal, from 1e-12 to 1e-2: fewer
+            digits take less time. Up to ``bandlimit`` points are summed directly, to rounding.
+
+        Returns
+        -------
+        ndarray, shape (..., *shape of the points), complex128 (float64 if ``real``)
+            The values, those of spin s in the frame (e_theta, e_phi) of each point; at a pole, of
+            the meridian that its longitude tells.
+
+        Raises
+        ------
+        ShapeError
+            If the last axis is not bandlimit**2 long, or the points do not broadcast.
+        DataError
+            If a coefficient or an angle is not a finite number, or a colatitude out of range.
+        ParameterError
+            If the accuracy is out of range.
+
+        Notes
+        -----
+        Cost O(L^2) a point for few points, O(L^3) and a non-uniform Fourier transform for many. The
+        bits of the latter may depend on the number of threads.
+
+        Examples
+        --------
+        >>> transform = SpinHarmonicTransform(8, real=True)
+        >>> flm = np.zeros(64)
+        >>> flm[2] = np.sqrt(4 * np.pi / 3)
+        >>> transform.synthesis_at(flm, [0.0, np.pi / 3], 0.0).round(12).tolist()
+        [1.0, 0.5]
+        """
+        flm = writable(check_flm(flm, self.bandlimit))
+        theta, phi = check_points(colatitudes, longitudes)
+        sums = self._point_sums(theta, phi, accuracy)
+        batch = flm.reshape(-1, self.bandlimit**2)
+        self._check_point_memory(sums, batch.shape[0], "synthesis_at")
+        values = np.empty((batch.shape[0], theta.size), float if self.real else complex)
+        for one, out in zip(batch, values, strict=True):
+            out[...] = sums.to_points(one)
+        return values.reshape(*flm.shape[:-1], *theta.shape)
+
+    def adjoint_synthesis_at(
+        self,
+        values: Array,
+        colatitudes: ArrayLike,
+        longitudes: ArrayLike,
+        *,
+        accuracy: float = 1e-12,
+    ) -> Array:
+        """Apply the adjoint of `synthesis_at`: sums over points, without weights.
+
+        Parameters
+        ----------
+        values : ndarray, shape (..., *shape of the points)
+            Values at the points.
+        colatitudes, longitudes, accuracy
+            As in `synthesis_at`.
+
+        Returns
+        -------
+        ndarray, shape (..., bandlimit**2), complex128
+            The coefficients.
+
+        Raises
+        ------
+        ShapeError, DataError, ParameterError
+            As `synthesis_at`, and if the values do not have the shape of the points.
+        """
+        theta, phi = check_points(colatitudes, longitudes)
+        if theta.ndim == 0:
+            theta, phi, values = theta[None], phi[None], np.expand_dims(values, -1)
+        values = check_map(values, theta.shape, real=self.real, name="values")
+        sums = self._point_sums(theta, phi, accuracy)
+        leading = values.shape[: values.ndim - theta.ndim]
+        self._check_point_memory(sums, math.prod(leading), "adjoint_synthesis_at")
+        flm = np.zeros((math.prod(leading), self.bandlimit**2), dtype=np.complex128)
+        for one, out in zip(values.reshape(-1, theta.size), flm, strict=True):
+            sums.from_points(one, out)
+        if self.real:
+            fill_negative_orders(flm)
+        return flm.reshape(*leading, self.bandlimit**2)
+
+    def resample(self, maps: Array, target: Sampling | str) -> Array:
+        """Compute the maps' values on another grid, exactly for band-limited signals.
+
+        Parameters
+        ----------
+        maps : ndarray, shape (..., rings, phi)
+            Maps on this transform's grid.
+        target : Sampling or str
+            The other grid, of this bandlimit or a larger one; a name means this one.
+
+        Returns
+        -------
+        ndarray, shape (..., rings, phi), complex128 (float64 if ``real``)
+            Maps on the target.
+
+        Raises
+        ------
+        ParameterError
+            If the target is not a grid, or cannot hold the bandlimit.
+        ShapeError, DataError
+            As `analysis`.
+
+        Examples
+        --------
+        >>> from spinsdw.sampling import GaussLegendre
+        >>> transform = SpinHarmonicTransform(8, real=True)
+        >>> transform.resample(np.ones((8, 15)), GaussLegendre(10)).shape
+        (10, 19)
+        """
+        bandlimit = target.bandlimit if isinstance(target, Sampling) else self.bandlimit
+        if bandlimit < self.bandlimit:
+            msg = (
+                f"target has bandlimit {bandlimit}, which cannot hold signals of bandlimit "
+                f"{self.bandlimit}; take one as large, or cut the coefficients off by "
+                "harmonics.resize between analysis and synthesis."
+            )
+            raise ParameterError(msg)
+        other = self._other(bandlimit, self.spin, target)
+        return other.synthesis(resize(self.analysis(maps), bandlimit))
+
+    def _other(
+        self, bandlimit: int, spin: int, sampling: Sampling | str, *, real: bool | None = None
+    ) -> SpinHarmonicTransform:
+        real = self.real if real is None else real
+        return SpinHarmonicTransform(
+            bandlimit,
+            spin,
+            sampling=sampling,
+            real=real,
+            threads=self.threads,
+            max_memory=self.max_memory,
+        )
+
+    def rotate(self, maps: Array, rotation: Sequence[float]) -> Array:
+        """Turn signals about z by gamma, then y by beta, then z by alpha; see `rotate_flm`.
+
+        Parameters
+        ----------
+        maps : ndarray, shape (..., rings, phi)
+            Maps on the grid.
+        rotation : sequence of 3 floats
+            Euler angles alpha, beta, gamma in radians, zyz.
+
+        Returns
+        -------
+        ndarray, shape (..., rings, phi)
+            The turned signals, those with spin in the frame of where they now are.
+
+        Raises
+        ------
+        ParameterError
+            If the rotation is not three finite numbers.
+        ShapeError, DataError
+            As `analysis`.
+        """
+        flm = self.analysis(maps)
+        return self.synthesis(rotate_flm(flm, rotation, real=self.real, threads=self.threads))
+
+    def raise_spin(self, maps: Array) -> Array:
+        """Apply eth (eq-eth) to maps; those of spin ``spin + 1`` on the same grid are complex128.
+
+        Shapes and errors are those of `analysis`; spin + 1 must be below the bandlimit. Minus
+        `lower_spin` of the transform of spin + 1 is the adjoint, in the integral over the sphere.
+        """
+        other = self._other(self.bandlimit, self.spin + 1, self.sampling, real=False)
+        return other.synthesis(raise_spin(self.analysis(maps), self.spin))
+
+    def lower_spin(self, maps: Array) -> Array:
+        """Apply eth-bar (eq-eth) to maps, which gives spin ``spin - 1``; as `raise_spin`."""
+        other = self._other(self.bandlimit, self.spin - 1, self.sampling, real=False)
+        return other.synthesis(lower_spin(self.analysis(maps), self.spin))

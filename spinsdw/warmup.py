@@ -81,6 +81,9 @@ def _spin_transforms(threads: int | None) -> None:
             maps = transform.synthesis(np.zeros(BANDLIMIT**2, dtype=np.complex128))
             transform.adjoint_analysis(transform.analysis(maps))
             transform.adjoint_synthesis(maps)
+            for points in (np.ones(2), np.ones(2 * BANDLIMIT)):
+                values = transform.synthesis_at(np.zeros(BANDLIMIT**2), points, points)
+                transform.adjoint_synthesis_at(values, points, points)
 
 
 def _rotations(threads: int | None) -> None:

@@ -28,6 +28,7 @@ LAYERS = (  # bottom to top
     {"rotation"},
     {"sampling"},
     {"grid_sums"},
+    {"point_sums"},
     {"tiling"},
     {"directionality"},
     {"orientation_sums", "steering"},

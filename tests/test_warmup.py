@@ -37,6 +37,11 @@ for sampling in SAMPLINGS:
             SpinHarmonicTransform(L, spin, sampling=sampling, real=real, threads=3),
             np.zeros((2, L * L), dtype=complex),
         )
+        points = np.linspace(0, 3, 40)
+        transform = SpinHarmonicTransform(L, spin, real=real)
+        for part in (points[3:7], points):
+            values = transform.synthesis_at(np.zeros((2, L * L)), part, part)
+            transform.adjoint_synthesis_at(values, part, part)
     for orders, real in (((-3, 0, 3), True), ((0, 1, 4), False), ((-5,), False)):
         around(
             WignerTransform(L, orders, sampling=sampling, real=real, threads=1),

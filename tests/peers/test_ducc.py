@@ -137,3 +137,21 @@ def test_wavelet_coefficients_are_convolutions(directions):
         desired = convolver.interpol(np.stack([beta, alpha, gamma], axis=-1))[0]
         # The peer interpolates, to the accuracy asked for.
         assert relative_error(coefficients[scale].ravel(), desired) < 1e-12
+
+
+@pytest.mark.parametrize("spin", [0, 2])
+def test_synthesis_at_points_agrees(spin):
+    bandlimit, rng = 64, np.random.default_rng(0)
+    transform = SpinHarmonicTransform(bandlimit, spin)
+    pair = random_pair(bandlimit, spin)
+    points = np.stack([np.arccos(rng.uniform(-1, 1, 500)), rng.uniform(0, 6, 500)], axis=1)
+    values = ducc0.sht.synthesis_general(
+        alm=np.array([to_peer(flm, bandlimit) for flm in pair]),
+        spin=spin,
+        lmax=bandlimit - 1,
+        loc=points,
+        epsilon=1e-12,
+    )
+    flm = eb_to_spin(*pair) if spin else pair[0]
+    found = transform.synthesis_at(flm, *points.T)
+    assert relative_error(found, values[0] + 1j * values[1] if spin else values[0]) < 4e-12
