@@ -227,7 +227,7 @@ def synthesis_operator(transform: Transform, door: str | None = None) -> Transfo
 
 
 def frame_operator(transform: SpinWaveletTransform) -> TransformOperator:
-    """Return the frame operator of the wavelets, on harmonic coefficients (eq-frame).
+    """Return the frame operator of the wavelets, on harmonic coefficients (eq-frame-operator).
 
     Unlike ``A.H @ A`` of an analysis operator, which adds up samples, it is made of integrals over
     the sphere and over rotations: a number for each degree, which is 1 for tight frames. Its

@@ -89,12 +89,12 @@ class ArraySpace(VectorSpace):
         return _dtype(real=self.real)
 
     def to_vector(self, values: Array) -> Array:
-        """Return arrays, shape (..., *shape), as vectors, shape (..., size)."""
+        """Return arrays, of ``shape``, as vectors, shape (..., size)."""
         values = np.asarray(values)
         return values.reshape(*values.shape[: values.ndim - len(self.shape)], self.size)
 
     def from_vector(self, vector: Array) -> Array:
-        """Return vectors, shape (..., size), as arrays, shape (..., *shape)."""
+        """Return vectors, shape (..., size), as arrays of ``shape``."""
         return np.asarray(vector).reshape(*np.shape(vector)[:-1], *self.shape)
 
 
@@ -134,7 +134,7 @@ class PairedSpace(VectorSpace):
         return latter, self.opposite[latter], np.flatnonzero(places == self.opposite)
 
     def to_vector(self, values: Array) -> Array:
-        """Return coefficients, shape (..., *shape), as vectors; those of m > 0 are read."""
+        """Return coefficients, of ``shape``, as vectors; those of m > 0 are read."""
         values = np.asarray(values)
         flat = values.reshape(*values.shape[: values.ndim - len(self.shape)], self.size)
         latter, former, alone = self._pairs

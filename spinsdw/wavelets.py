@@ -220,7 +220,7 @@ class Wavelets:
 
     @property
     def frame_response(self) -> FloatArray:
-        """The frame operator's value at each degree, shape (bandlimit,), float64 (eq-frame).
+        """The frame operator's value at each degree, shape (bandlimit,), float64 (eq-frame-operator).
 
         It is 1 from ``lowest_degree`` upwards where wavelets and `dual` are the same.
         """
@@ -228,7 +228,7 @@ class Wavelets:
 
     @property
     def frame_bounds(self) -> tuple[float, float]:
-        """The bounds of the frame: the least and largest of ``frame_response`` (eq-frame).
+        """The bounds of the frame: the least and largest of ``frame_response`` (eq-frame-operator).
 
         Of the degrees that the wavelets hold: signals with ``lost_degrees`` are left out.
         """

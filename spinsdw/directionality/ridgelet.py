@@ -30,7 +30,7 @@ def radon_factors(bandlimit: int, spin: int = 0) -> NDArray[np.float64]:
     Returns
     -------
     ndarray, shape (bandlimit,), float64
-        ``2 pi (-1)**spin d^l_{0,-spin}(pi/2)``: zero where l + spin is odd, and below |spin|.
+        ``2 pi (-1)**spin d^l_{0,-spin}(pi/2)``: zero where l + spin is odd, and below the size of ``spin``.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class RidgeletDirectionality(Directionality):
         Returns
         -------
         ndarray, shape (1, bandlimit), complex128
-            Zero where l + spin is odd, below |spin|, and at degree 0.
+            Zero where l + spin is odd, below the size of ``spin``, and at degree 0.
 
         Raises
         ------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spinsdw.harmonics import resize
 from spinsdw.peer_layouts import coefficients_to_s2let, s2let_to_coefficients, wigner_to_so3
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -269,3 +270,38 @@ def test_wigner_coefficients_in_the_peers_layout_are_its(directions, spin):
         wigner = wavelet_wigner(flm, transform.wavelets, scale)[:, :size]
         parts.append(wigner_to_so3(wigner, orders, directions, storage="compact"))
     assert_close(np.concatenate(parts), peer, ulps=16)
+
+
+def join_parts(transform, parts, *, upsample):
+    """Lay Wigner coefficients out as the peer: compact, at the bandlimit that it takes."""
+    rows = []
+    for scale in transform.scales:
+        padded = resize(parts[scale], transform.bandlimits[scale])
+        orders = transform.wavelets.orientations_of(scale).orders
+        rows.append(wigner_to_so3(padded, orders, transform.directions, storage="compact"))
+    size = transform.bandlimit if upsample else transform.tiling.scaling_bandlimit
+    return np.concatenate(rows), resize(parts["scaling"], size)
+
+
+@every_case
+def test_wigner_door_agrees(dilation, bandlimit, lowest_scale, directions, spin, upsample):
+    """Analysis, synthesis and both adjoints between f_lm and W_lmn, of any coefficients."""
+    arguments = (dilation, bandlimit, lowest_scale, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    flm = random_flm(bandlimit, spin)
+    parts = transform.analysis_wigner(flm)
+    noise = {key: random_like(values, seed=1) * (values != 0) for key, values in parts.items()}
+    for found, peer in (
+        (parts, pys2let.analysis_lm2lmn),
+        (transform.adjoint_synthesis_wigner(flm), pys2let.synthesis_adjoint_lm2lmn),
+    ):
+        for ours, theirs in zip(
+            join_parts(transform, found, upsample=upsample), peer(flm, *arguments), strict=True
+        ):
+            assert_close(ours, theirs, ulps=16)
+    vectors = join_parts(transform, noise, upsample=upsample)
+    for ours, peer in (
+        (transform.synthesis_wigner(noise), pys2let.synthesis_lmn2lm),
+        (transform.adjoint_analysis_wigner(noise), pys2let.analysis_adjoint_lmn2lm),
+    ):
+        assert_close(ours, peer(*vectors, *arguments), ulps=64)
