@@ -220,9 +220,9 @@ class Wavelets:
 
     @property
     def frame_response(self) -> FloatArray:
-        """The frame operator's value at each degree, shape (bandlimit,), float64 (eq-frame-operator).
+        """The frame operator's value at each degree (eq-frame-operator).
 
-        It is 1 from ``lowest_degree`` upwards where wavelets and `dual` are the same.
+        Shape (bandlimit,), float64. It is 1 from ``lowest_degree`` upwards where wavelets and `dual` are the same.
         """
         return self._squares(self)
 

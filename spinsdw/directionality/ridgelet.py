@@ -30,7 +30,8 @@ def radon_factors(bandlimit: int, spin: int = 0) -> NDArray[np.float64]:
     Returns
     -------
     ndarray, shape (bandlimit,), float64
-        ``2 pi (-1)**spin d^l_{0,-spin}(pi/2)``: zero where l + spin is odd, and below the size of ``spin``.
+        ``2 pi (-1)**spin d^l_{0,-spin}(pi/2)``: zero where l + spin is odd, and below the size of
+        ``spin``.
 
     Raises
     ------
