@@ -222,7 +222,8 @@ class Wavelets:
     def frame_response(self) -> FloatArray:
         """The frame operator's value at each degree (eq-frame-operator).
 
-        Shape (bandlimit,), float64. It is 1 from ``lowest_degree`` upwards where wavelets and `dual` are the same.
+        Shape (bandlimit,), float64. It is 1 from ``lowest_degree`` upwards where wavelets and
+        `dual` are the same.
         """
         return self._squares(self)
 
