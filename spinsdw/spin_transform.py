@@ -309,7 +309,7 @@ class SpinHarmonicTransform:
         values = np.empty((batch.shape[0], theta.size), float if self.real else complex)
         for one, out in zip(batch, values, strict=True):
             out[...] = sums.to_points(one)
-        return values.reshape(*flm.shape[:-1], *theta.shape)
+        return values.reshape((*flm.shape[:-1], *theta.shape))
 
     def adjoint_synthesis_at(
         self,
