@@ -346,7 +346,7 @@ class SpinHarmonicTransform:
         leading = values.shape[: values.ndim - theta.ndim]
         self._check_point_memory(sums, math.prod(leading), "adjoint_synthesis_at")
         flm = np.zeros((math.prod(leading), self.bandlimit**2), dtype=np.complex128)
-        for one, out in zip(values.reshape(-1, theta.size), flm, strict=True):
+        for one, out in zip(values.reshape(len(flm), theta.size), flm, strict=True):
             sums.from_points(one, out)
         if self.real:
             fill_negative_orders(flm)
