@@ -140,7 +140,7 @@ class WaveletCoefficients:
         """Tell whether a scale can have so many: of curvelets the coarser ones have fewer."""
         directions: Any = self._parameters.get("directions")
         if "directionality" in self._parameters:
-            return 1 <= orientations <= directions and orientations % 2 == directions % 2
+            return 1 <= orientations <= directions
         return orientations == directions
 
     # Built anew from its parts: the mapping of the parameters cannot be pickled itself.

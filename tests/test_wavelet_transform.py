@@ -318,6 +318,27 @@ def test_coefficients_of_other_wavelets_of_one_shape_are_refused():
                     other.synthesis_harmonic(coefficients)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"directionality": CurveletDirectionality()},
+        {"directionality": CurveletDirectionality(centred=True), "real": True},
+        {"directionality": RidgeletDirectionality(1)},
+        {"directions": 3, "original_spin": 2},
+    ],
+)
+def test_coefficients_of_every_kind_are_kept_in_files(options, tmp_path):
+    """With their parameters, by which synthesis knows them and steering their orders."""
+    transform = SpinWaveletTransform(8, **options)
+    flm = random_signal(transform)
+    coefficients = transform.analysis_harmonic(flm)
+    found = read_coefficients(write_coefficients(tmp_path / "w.fits", coefficients))
+    assert dict(found.parameters) == dict(coefficients.parameters)
+    assert_equal(found, coefficients)
+    assert np.array_equal(found.steer(0.4)[2], coefficients.steer(0.4)[2])
+    assert_close(transform.synthesis_harmonic(found), flm, ulps=8 * tolerance(8))
+
+
 @pytest.mark.parametrize("directions", [2, 3])
 def test_scales_without_orders_are_zero(directions):
     """An empty scale of a tiling of one's own has bandlimit 1 and no order of either parity."""

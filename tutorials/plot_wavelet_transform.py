@@ -71,16 +71,14 @@ turned = dense.steer(np.pi)
 print(f"Largest difference after half a turn: {np.abs(turned[3] - dense[3][0]).max():.0e} µK")
 
 # %%
-# So the angle at which a place answers most strongly is known as finely as we like; here in steps
-# of five degrees, where the answer is strong.
-angles = np.radians(np.arange(0, 180, 5))
-answers = np.abs([dense.steer(angle)[3] for angle in angles])
-strongest = np.degrees(angles[np.argmax(answers, axis=0)])
-is_strong = answers.max(axis=0) > np.median(answers.max(axis=0))
+# So the angle at which a place answers most strongly is known exactly, and how strongly; here
+# where the answer is strong, of either sign.
+angle, strength = dense.strongest_orientation(3, modulus=True)
+is_strong = strength > np.median(strength)
 figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
 image = plot_mollweide(
     axes,
-    strongest,
+    np.degrees(angle),
     title="orientation of scale 3",
     unit="degrees",
     mask=is_strong,
