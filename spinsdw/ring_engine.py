@@ -16,12 +16,22 @@ import numpy as np
 
 from spinsdw.parallel import run_tasks
 
-__all__ = ["OrderSums", "RingEngine", "make_runs"]
+__all__ = ["OrderCall", "OrderSums", "RingEngine", "make_runs", "share_orders"]
 
 Array = np.ndarray[Any, Any]
+OrderCall = Callable[[int, int], None]
 
 # exp(-45) = 2**-65: d^l_mn below it adds nothing to a sum in double precision.
 _NEGLIGIBLE = 45.0
+
+
+def share_orders(call: OrderCall, bandlimit: int, threads: int) -> None:
+    """Call for ranges of orders that cover 0 <= m < bandlimit, on ``threads`` threads."""
+    from spinsdw.compiled.order_sums import M_CHUNK
+
+    step = bandlimit if threads == 1 else M_CHUNK
+    ranges = [(m, min(m + step, bandlimit)) for m in range(0, bandlimit, step)]
+    run_tasks([functools.partial(call, *one) for one in ranges], threads)
 
 
 @functools.lru_cache(maxsize=128)
@@ -119,7 +129,8 @@ class RingEngine:
     symmetric: bool = False
 
     @functools.cached_property
-    def _tables(self) -> tuple[Array, Array, Array]:
+    def tables(self) -> tuple[Array, Array, Array]:
+        """sqrt(k), the central binomials over 4^k, and 1 / k."""
         numbers = np.arange(2 * self.bandlimit + 2, dtype=float)
         inverse = np.divide(1.0, numbers, out=np.zeros_like(numbers), where=numbers > 0)
         # binom(2M, M) / 4**M, up to M = L for the orders above m.
@@ -139,15 +150,16 @@ class RingEngine:
         return tuple(np.concatenate([v, np.full(padding, fill)]) for v, fill in columns)
 
     @functools.cached_property
-    def _rings(self) -> tuple[Array, ...]:
+    def rings(self) -> tuple[Array, ...]:
+        """sin, 1 + cos, 1 - cos and cos - 1 of every ring, and of one block of padding."""
         from spinsdw.compiled.vectors import RINGS
 
         return self._padded_rings(RINGS)
 
     @functools.lru_cache(maxsize=32)  # noqa: B019 - engines are few and shared
-    def _windows(self, largest_order: int) -> Array:
+    def windows(self, largest_order: int) -> Array:
         """For each m the first and one past the last ring that matter at |n| <= largest_order."""
-        sine = self._rings[0][: self.colatitudes.size]
+        sine = self.rings[0][: self.colatitudes.size]
         reach = _largest_order(sine, self.bandlimit) + largest_order
         m = np.arange(self.bandlimit)
         north = np.maximum.accumulate(reach)
@@ -158,66 +170,37 @@ class RingEngine:
 
     def _geometry(self, sums: OrderSums) -> tuple[Any, ...]:
         runs = make_runs(sums.orders, symmetric=self.symmetric, sides=sums.sides)
-        windows = self._windows(max(abs(n) for n in sums.orders))
+        windows = self.windows(max(abs(n) for n in sums.orders))
         return runs, windows
 
-    def _share(self, call: Callable[[int, int], None], threads: int) -> None:
-        from spinsdw.compiled.order_sums import M_CHUNK
+    def filling(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> OrderCall:
+        """Return what fills the orders first <= m < stop of ``out[k, m, ring]``.
 
-        step = self.bandlimit if threads == 1 else M_CHUNK
-        run_tasks(
-            [
-                functools.partial(call, m, min(m + step, self.bandlimit))
-                for m in range(0, self.bandlimit, step)
-            ],
-            threads,
-        )
-
-    def fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> None:
-        """Fill ``out[k, m, ring]``; shapes as in `compiled.order_sums.fill_columns`."""
+        Shapes as in `compiled.order_sums.fill_columns`.
+        """
         from spinsdw.compiled.order_sums import fill_columns
 
         runs, windows = self._geometry(sums)
+        inputs = (self.bandlimit, sums.lowest, sums.sides, flm, sums.weights, runs, mixing)
+        geometry = (self.rings, windows, self.tables)
+        return lambda first, stop: fill_columns(first, stop, *inputs, *geometry, out)
 
-        def task(first: int, stop: int) -> None:
-            fill_columns(
-                first,
-                stop,
-                self.bandlimit,
-                sums.lowest,
-                sums.sides,
-                flm,
-                sums.weights,
-                runs,
-                mixing,
-                self._rings,
-                windows,
-                self._tables,
-                out,
-            )
+    def adding(self, columns: Array, sums: OrderSums, out: Array) -> OrderCall:
+        """Return what adds to the coefficients ``out`` of the orders first <= m < stop.
 
-        self._share(task, sums.threads)
-
-    def add_to_harmonics(self, columns: Array, sums: OrderSums, out: Array) -> None:
-        """Add to ``out``; shapes as in `compiled.order_sums.add_columns_to_harmonics`."""
+        Shapes as in `compiled.order_sums.add_columns_to_harmonics`.
+        """
         from spinsdw.compiled.order_sums import add_columns_to_harmonics
 
         runs, windows = self._geometry(sums)
+        inputs = (self.bandlimit, sums.lowest, sums.sides, columns, sums.weights, runs)
+        geometry = (self.rings, windows, self.tables)
+        return lambda first, stop: add_columns_to_harmonics(first, stop, *inputs, *geometry, out)
 
-        def task(first: int, stop: int) -> None:
-            add_columns_to_harmonics(
-                first,
-                stop,
-                self.bandlimit,
-                sums.lowest,
-                sums.sides,
-                columns,
-                sums.weights,
-                runs,
-                self._rings,
-                windows,
-                self._tables,
-                out,
-            )
+    def fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> None:
+        """Fill ``out[k, m, ring]``, on ``sums.threads`` threads."""
+        share_orders(self.filling(flm, sums, mixing, out), self.bandlimit, sums.threads)
 
-        self._share(task, sums.threads)
+    def add_to_harmonics(self, columns: Array, sums: OrderSums, out: Array) -> None:
+        """Add to the coefficients ``out``, on ``sums.threads`` threads."""
+        share_orders(self.adding(columns, sums, out), self.bandlimit, sums.threads)

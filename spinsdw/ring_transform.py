@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from spinsdw.errors import ParameterError
-from spinsdw.fourier import from_series, to_series
 from spinsdw.grid_sums import fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.memory import MemoryEstimate, check_max_memory
+from spinsdw.mirror_engine import MirrorEngine
 from spinsdw.parallel import resolve_threads, run_tasks, threads_for
-from spinsdw.ring_engine import OrderSums, RingEngine
+from spinsdw.ring_blocks import RingBlock, mirror_engine, ring_blocks, task_bytes
+from spinsdw.ring_engine import OrderSums
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.signals import check_flag, check_map, check_spin, writable
 
@@ -24,67 +25,8 @@ __all__ = ["HealpixTransform"]
 
 Array = np.ndarray[Any, Any]
 
-# Rings that one task transforms.
-_BLOCK_RINGS = 16
-
-
-@functools.lru_cache(maxsize=16)
-def _engine(nside: int, bandlimit: int) -> RingEngine:
-    north = HealpixRings(nside).colatitudes[: 2 * nside]
-    return RingEngine(bandlimit, north, symmetric=True)
-
-
-@dataclass(frozen=True, eq=False)
-class _RingBlock:
-    """A few neighbouring rings between their Fourier columns and their pixels."""
-
-    first: int
-    sizes: Array
-    phis: Array
-    first_pixel: int
-    real: bool
-
-    @property
-    def _modes(self) -> Array:
-        return self.sizes // 2 + 1 if self.real else self.sizes
-
-    def _transform(
-        self, call: Callable[[Array, Array], None], folded: Array, pixels: Array
-    ) -> None:
-        """Call for runs of rings of one size: (folded, pixels) as (rings, modes or points)."""
-        changes = np.flatnonzero(np.diff(self.sizes)) + 1
-        mode, pixel = 0, self.first_pixel
-        for run in np.split(self.sizes, changes):
-            points = int(run[0])
-            modes = points // 2 + 1 if self.real else points
-            n_modes, n_points = run.size * modes, run.size * points
-            call(
-                folded[mode : mode + n_modes].reshape(run.size, modes),
-                pixels[pixel : pixel + n_points].reshape(run.size, points),
-            )
-            mode, pixel = mode + n_modes, pixel + n_points
-
-    def _room(self) -> tuple[Array, Array]:
-        """Return where each ring's modes begin, and room for all."""
-        modes = self._modes
-        starts = np.concatenate([[0], np.cumsum(modes)[:-1]])
-        return starts, np.empty(int(modes.sum()), dtype=np.complex128)
-
-    def fill_pixels(self, bandlimit: int, columns: Array, pixels: Array) -> None:
-        from spinsdw.compiled.folding import fill_folded
-
-        starts, folded = self._room()
-        geometry = (self.first, self.sizes, self.phis, starts, self.real)
-        fill_folded(bandlimit, columns, *geometry, folded)
-        self._transform(from_series, folded, pixels)
-
-    def fill_columns(self, bandlimit: int, pixels: Array, columns: Array) -> None:
-        from spinsdw.compiled.folding import fill_unfolded
-
-        starts, folded = self._room()
-        self._transform(lambda modes, values: to_series(values, modes), folded, pixels)
-        geometry = (self.first, self.sizes, self.phis, starts, self.real)
-        fill_unfolded(bandlimit, folded, *geometry, columns)
+# Bytes of the Fourier columns of the maps that go through the sums together.
+_COLUMN_BYTES = 2**28
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +117,13 @@ class HealpixTransform:
         return OrderSums((-self.spin,), self._weights, 0, sides, self._threads)
 
     @property
-    def _columns_shape(self) -> tuple[int, int, int]:
+    def _columns_shape(self) -> tuple[int, int]:
         n_m = self.bandlimit if self.real else 2 * self.bandlimit - 1
-        return (1, n_m, self.rings.n_rings)
+        return (n_m, self.rings.n_rings)
+
+    @property
+    def _engine(self) -> MirrorEngine:
+        return mirror_engine(self.nside, self.bandlimit, -self.spin)
 
     @property
     def _maps_dtype(self) -> type[np.generic]:
@@ -210,9 +156,9 @@ class HealpixTransform:
         batch = check_integer(batch, "batch", minimum=0)
         flm = batch * 16 * self.bandlimit**2
         maps = batch * self.rings.n_pixels * np.dtype(self._maps_dtype).itemsize
-        # A thread folds a few rings at a time, each with the phases of its orders.
-        folded = 16 * _BLOCK_RINGS * (4 * self.nside + self.bandlimit)
-        working = 16 * math.prod(self._columns_shape) + self._threads * folded
+        together = min(batch, self._maps_together)
+        columns = 16 * together * math.prod(self._columns_shape)
+        working = columns + self._threads * together * task_bytes(self.nside)
         return {
             "synthesis": MemoryEstimate(flm, maps, working),
             "adjoint_synthesis": MemoryEstimate(maps, flm, working),
@@ -222,28 +168,28 @@ class HealpixTransform:
         if self.max_memory is not None:
             self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
 
-    def _share_rings(self, call: Callable[[_RingBlock], None]) -> None:
-        rings = self.rings
-        sizes, phis, starts = rings.n_phi, rings.first_longitudes, rings.starts
-        blocks = []
-        for first in range(0, rings.n_rings, _BLOCK_RINGS):
-            part = slice(first, first + _BLOCK_RINGS)
-            blocks.append(_RingBlock(first, sizes[part], phis[part], int(starts[first]), self.real))
-        # The long rings first, so that threads finish together.
-        blocks.sort(key=lambda block: -int(block.sizes.sum()))
-        tasks = [functools.partial(call, block) for block in blocks]
-        run_tasks(tasks, self._threads)
+    def _share_rings(self, call: Callable[[RingBlock], None]) -> None:
+        blocks = ring_blocks(self.nside, self.bandlimit, -self.spin)
+        run_tasks([functools.partial(call, block) for block in blocks], self._threads)
 
-    def _fill_map(self, flm: Array, pixels: Array) -> None:
-        columns = np.empty(self._columns_shape, dtype=np.complex128)
-        one = np.ones((1, 1), dtype=np.complex128)
-        _engine(self.nside, self.bandlimit).fill_columns(flm[None], self._sums, one, columns)
-        self._share_rings(lambda block: block.fill_pixels(self.bandlimit, columns[0], pixels))
+    @property
+    def _maps_together(self) -> int:
+        """Maps that go through the sums at once: they share recursions, and add up in memory."""
+        return max(1, _COLUMN_BYTES // (16 * math.prod(self._columns_shape)))
 
-    def _to_coefficients(self, pixels: Array, flm: Array) -> None:
-        columns = np.empty(self._columns_shape, dtype=np.complex128)
-        self._share_rings(lambda block: block.fill_columns(self.bandlimit, pixels, columns[0]))
-        _engine(self.nside, self.bandlimit).add_to_harmonics(columns, self._sums, flm[None])
+    def _parts(self, maps: int) -> list[slice]:
+        step = self._maps_together
+        return [slice(first, first + step) for first in range(0, maps, step)]
+
+    def _fill_maps(self, flm: Array, maps: Array) -> None:
+        columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
+        self._engine.fill_columns(flm, self._sums, columns)
+        self._share_rings(lambda block: block.fill_pixels(columns, maps))
+
+    def _add_coefficients(self, maps: Array, flm: Array) -> None:
+        columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
+        self._share_rings(lambda block: block.fill_columns(maps, columns))
+        self._engine.add_to_harmonics(columns, self._sums, flm)
 
     def synthesis(self, flm: Array) -> Array:
         """Compute maps from harmonic coefficients.
@@ -272,8 +218,8 @@ class HealpixTransform:
         flm = writable(check_flm(flm, self.bandlimit))
         batch = flm.reshape(-1, flm.shape[-1])
         maps = np.empty((len(batch), *self.shape), dtype=self._maps_dtype)
-        for one, out in zip(batch, maps, strict=True):
-            self._fill_map(one, out)
+        for part in self._parts(len(batch)):
+            self._fill_maps(batch[part], maps[part])
         return maps.reshape(*flm.shape[:-1], *self.shape)
 
     def adjoint_synthesis(self, maps: Array) -> Array:
@@ -302,8 +248,8 @@ class HealpixTransform:
         maps = check_map(maps, self.shape, real=self.real)
         rows = maps.reshape(-1, self.rings.n_pixels)
         flm = np.zeros((rows.shape[0], self.bandlimit**2), dtype=np.complex128)
-        for one, out in zip(rows, flm, strict=True):
-            self._to_coefficients(one, out)
+        for part in self._parts(len(rows)):
+            self._add_coefficients(rows[part], flm[part])
         if self.real:
             fill_negative_orders(flm)
         return flm.reshape(*maps.shape[:-1], self.bandlimit**2)

@@ -437,9 +437,10 @@ def test_each_map_of_a_stack_is_fitted_as_if_alone():
     stack[1] += np.random.default_rng(11).standard_normal(768)
     together, fit = map_to_flm(stack[None], 13, 2)
     alone = [map_to_flm(maps, 13, 2) for maps in stack]
-    assert np.array_equal(together[0], np.stack([flm for flm, _ in alone]))
+    # Transforms of several maps round in another order; the fit is well conditioned.
+    assert_close(together[0], np.stack([flm for flm, _ in alone]), ulps=1024)
     assert fit.iterations == max(one.iterations for _, one in alone)
-    assert fit.map_residual == max(one.map_residual for _, one in alone)
+    assert_close(fit.map_residual, max(one.map_residual for _, one in alone), ulps=1024)
 
 
 def test_zero_maps_have_zero_coefficients_without_a_step():

@@ -112,8 +112,9 @@ def test_leading_axes_are_a_batch(batch, real):
     assert maps.shape == (*batch, 48)
     assert back.shape == (*batch, 25)
     for place in np.ndindex(*batch):
-        assert np.array_equal(maps[place], transform.synthesis(flm[place]))
-        assert np.array_equal(back[place], transform.adjoint_synthesis(maps[place]))
+        # Fourier transforms of several lines at once round in another order.
+        assert_close(maps[place], transform.synthesis(flm[place]), ulps=16)
+        assert_close(back[place], transform.adjoint_synthesis(maps[place]), ulps=16)
 
 
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])

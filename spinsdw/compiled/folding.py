@@ -1,8 +1,13 @@
 """Fourier columns on rings that have fewer points than the series has terms, and a first longitude.
 
 On a ring of P points starting at phi_0, F_m e^{i m phi} is seen as mode m modulo P with the factor
-e^{i m phi_0}. Columns are complex arrays [m, ring], -m at place n_m - m; folded rings lie one after
-the other, with modes 0 .. P - 1, or 0 .. P / 2 for real maps, whose mode -k is the conjugate of k.
+e^{i m phi_0}. Columns are complex arrays [map, m, ring], -m at place n_m - m; of folded rings ring
+r of map i has its modes from ``starts[i, r]`` on, 0 .. P - 1, or 0 .. P / 2 for real maps, whose
+mode -k is the conjugate of k.
+
+Orders are taken a few at a time: columns are read along rings and folded rings written along
+orders, and both stay in the first-level cache. Orders from ``limits[r]`` on are none of the ring's:
+they are neither read nor written.
 """
 
 from __future__ import annotations
@@ -19,93 +24,143 @@ _STRIDE = 32
 
 
 @kernel
-def _fill_phases(phi, phases):
-    """phases[m] = e^{i m phi}, one product away from sine and cosine: no error grows with m."""
-    steps = np.empty(_STRIDE, dtype=np.complex128)
-    for t in range(_STRIDE):
-        steps[t] = complex(math.cos(t * phi), math.sin(t * phi))
-    for first in range(0, phases.size, _STRIDE):
-        base = complex(math.cos(first * phi), math.sin(first * phi))
-        for t in range(min(_STRIDE, phases.size - first)):
-            phases[first + t] = base * steps[t]
+def _largest(values):
+    found = 0
+    for value in values:
+        found = max(found, value)
+    return found
 
 
 @kernel
-def _fill_ring_phases(phis, row, phases):
-    """phases[m, r] = e^{i m phis[r]}; neighbouring rings of the belt share theirs."""
+def _fill_steps(phis, steps):
+    """steps[r, t] = e^{i t phis[r]}; rings next but one, or neighbours, may share theirs."""
     for r in range(phis.size):
-        if r > 1 and phis[r] == phis[r - 2]:
-            for m in range(row.size):
-                phases[m, r] = phases[m, r - 2]
+        like = -1
+        for other in range(max(r - 2, 0), r):
+            if phis[other] == phis[r]:
+                like = other
+        for t in range(_STRIDE):
+            if like >= 0:
+                steps[r, t] = steps[like, t]
+            else:
+                steps[r, t] = complex(math.cos(t * phis[r]), math.sin(t * phis[r]))
+
+
+@kernel
+def _prepare_phases(m, phi, steps, held, phases):
+    """Return where phases[., t] = e^{i (m + t) phi}, one product away from sine and cosine.
+
+    The last two longitudes are held: every other ring of the belt has the same.
+    """
+    if held[0] == phi:
+        return 0
+    if held[1] == phi:
+        return 1
+    place = int(held[2])
+    base = complex(math.cos(m * phi), math.sin(m * phi))
+    for t in range(_STRIDE):
+        phases[place, t] = base * steps[t]
+    held[place] = phi
+    held[2] = 1 - place
+    return place
+
+
+@kernel
+def _add_modes(first, stop, ring, points, phases, columns, modes):
+    """Add orders first <= m < stop and -m of one ring to its modes."""
+    n_m = columns.shape[0]
+    k = first % points
+    for m in range(first, stop):
+        phase = phases[m - first]
+        opposite = points - k if k > 0 else 0
+        modes[k] += phase * columns[m, ring]
+        modes[opposite] += phase.conjugate() * columns[n_m - m, ring]
+        k = k + 1 if k + 1 < points else 0
+
+
+@kernel
+def _add_real_modes(first, stop, ring, points, phases, columns, modes):
+    """Add F e^{i k phi} and its conjugate to the half series of one ring."""
+    k = first % points
+    for m in range(first, stop):
+        value = phases[m - first] * columns[m, ring]
+        if k == 0 or 2 * k == points:
+            modes[k] += 2.0 * value.real
+        elif 2 * k < points:
+            modes[k] += value
         else:
-            _fill_phases(phis[r], row)
-            for m in range(row.size):
-                phases[m, r] = row[m]
+            modes[points - k] += value.conjugate()
+        k = k + 1 if k + 1 < points else 0
 
 
 @kernel
-def _next_modes(sizes, modes):
-    """Count m modulo the points of each ring: a division for each would cost more than the sum."""
-    for r in range(sizes.size):
-        modes[r] += 1
-        if modes[r] == sizes[r]:
-            modes[r] = 0
-
-
-@kernel
-def _add_real_mode(value, k, points, out, start):
-    """Add F e^{i k phi} and its conjugate to a half series, 0 <= k < points."""
-    if k == 0 or 2 * k == points:
-        out[start + k] += 2.0 * value.real
-    elif 2 * k < points:
-        out[start + k] += value
-    else:
-        out[start + points - k] += value.conjugate()
-
-
-@kernel
-def fill_folded(L, columns, first_ring, sizes, phis, starts, is_real, folded):
-    """Fold the columns of sizes.size rings from first_ring on; ring r begins at starts[r]."""
-    n_m, n_rings = columns.shape[0], sizes.size
-    phases = np.empty((L, n_rings), dtype=np.complex128)
-    _fill_ring_phases(phis, np.empty(L, dtype=np.complex128), phases)
-    modes = np.zeros(n_rings, dtype=np.int64)
+def fill_folded(columns, rings, sizes, phis, limits, starts, is_real, folded):
+    """Fold the columns of some rings."""
+    steps = np.empty((rings.size, _STRIDE), dtype=np.complex128)
+    phases = np.empty((2, _STRIDE), dtype=np.complex128)
+    held = np.zeros(3)
+    _fill_steps(phis, steps)
     folded[:] = 0.0
-    for r in range(n_rings):
-        value = columns[0, first_ring + r]
-        folded[starts[r]] += value.real if is_real else value
-    for m in range(1, L):
-        _next_modes(sizes, modes)
-        for r in range(n_rings):
-            k, phase = modes[r], phases[m, r]
-            value = phase * columns[m, first_ring + r]
-            if is_real:
-                _add_real_mode(value, k, sizes[r], folded, starts[r])
-            else:
-                opposite = sizes[r] - k if k > 0 else 0
-                folded[starts[r] + k] += value
-                value = phase.conjugate() * columns[n_m - m, first_ring + r]
-                folded[starts[r] + opposite] += value
+    for r in range(rings.size):
+        for i in range(columns.shape[0]):
+            value = columns[i, 0, rings[r]]
+            folded[starts[i, r]] += value.real if is_real else value
+    for first in range(1, _largest(limits), _STRIDE):
+        held[0] = held[1] = np.nan
+        for r in range(rings.size):
+            stop = min(first + _STRIDE, limits[r])
+            place = _prepare_phases(first, phis[r], steps[r], held, phases)
+            for i in range(columns.shape[0]):
+                modes = folded[starts[i, r] :]
+                if is_real:
+                    _add_real_modes(
+                        first, stop, rings[r], sizes[r], phases[place], columns[i], modes
+                    )
+                else:
+                    _add_modes(first, stop, rings[r], sizes[r], phases[place], columns[i], modes)
 
 
 @kernel
-def fill_unfolded(L, folded, first_ring, sizes, phis, starts, is_real, columns):
+def _take_modes(first, stop, ring, points, phases, modes, columns):
+    n_m = columns.shape[0]
+    k = first % points
+    for m in range(first, stop):
+        phase = phases[m - first]
+        opposite = points - k if k > 0 else 0
+        columns[m, ring] = phase.conjugate() * modes[k]
+        columns[n_m - m, ring] = phase * modes[opposite]
+        k = k + 1 if k + 1 < points else 0
+
+
+@kernel
+def _take_real_modes(first, stop, ring, points, phases, modes, columns):
+    k = first % points
+    for m in range(first, stop):
+        value = modes[points - k].conjugate() if 2 * k > points else modes[k]
+        columns[m, ring] = phases[m - first].conjugate() * value
+        k = k + 1 if k + 1 < points else 0
+
+
+@kernel
+def fill_unfolded(folded, rings, sizes, phis, limits, starts, is_real, columns):
     """Adjoint of `fill_folded`, the conjugate half of a real map left out."""
-    n_m, n_rings = columns.shape[0], sizes.size
-    phases = np.empty((L, n_rings), dtype=np.complex128)
-    _fill_ring_phases(phis, np.empty(L, dtype=np.complex128), phases)
-    modes = np.zeros(n_rings, dtype=np.int64)
-    for r in range(n_rings):
-        columns[0, first_ring + r] = folded[starts[r]]
-    for m in range(1, L):
-        _next_modes(sizes, modes)
-        for r in range(n_rings):
-            k, phase = modes[r], phases[m, r]
-            opposite = sizes[r] - k if k > 0 else 0
-            if is_real and 2 * k > sizes[r]:
-                value = folded[starts[r] + opposite].conjugate()
-            else:
-                value = folded[starts[r] + k]
-            columns[m, first_ring + r] = phase.conjugate() * value
-            if not is_real:
-                columns[n_m - m, first_ring + r] = phase * folded[starts[r] + opposite]
+    steps = np.empty((rings.size, _STRIDE), dtype=np.complex128)
+    phases = np.empty((2, _STRIDE), dtype=np.complex128)
+    held = np.zeros(3)
+    _fill_steps(phis, steps)
+    for r in range(rings.size):
+        for i in range(columns.shape[0]):
+            columns[i, 0, rings[r]] = folded[starts[i, r]]
+    for first in range(1, _largest(limits), _STRIDE):
+        held[0] = held[1] = np.nan
+        for r in range(rings.size):
+            stop = min(first + _STRIDE, limits[r])
+            place = _prepare_phases(first, phis[r], steps[r], held, phases)
+            for i in range(columns.shape[0]):
+                modes = folded[starts[i, r] :]
+                if is_real:
+                    _take_real_modes(
+                        first, stop, rings[r], sizes[r], phases[place], modes, columns[i]
+                    )
+                else:
+                    _take_modes(first, stop, rings[r], sizes[r], phases[place], modes, columns[i])

@@ -19,14 +19,13 @@ import numpy as np
 
 from spinsdw.compiled.jit import kernel
 from spinsdw.compiled.ring_sums import add_block_to_degrees, sum_block
-from spinsdw.compiled.vectors import RINGS, WIDTH
+from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
 from spinsdw.compiled.wigner_recursion import (
     PADDING,
-    fill_powers,
     fill_recursion,
     fill_start,
-    multiply_powers,
-    start_norm,
+    prepare_powers,
+    signed_norm,
 )
 
 __all__ = ["M_CHUNK", "add_columns_to_harmonics", "fill_columns"]
@@ -34,37 +33,6 @@ __all__ = ["M_CHUNK", "add_columns_to_harmonics", "fill_columns"]
 # Powers of sin(theta) are carried from m to m + 1 and computed anew at every multiple of M_CHUNK,
 # so that results do not depend on how a caller splits the range of m (at multiples of it).
 M_CHUNK = 16
-
-
-@kernel
-def _fill_order_powers(m, n, rings, powers):
-    """Fill sin(theta)^(M - |K|) and (1 +- cos(theta))^|K|: all of d^M_mn that depends on theta."""
-    sine, plus, minus = rings[0], rings[1], rings[2]
-    n_abs = abs(n)
-    fill_powers(sine, abs(m - n_abs), powers[0], powers[1])
-    fill_powers(plus if n >= 0 else minus, min(m, n_abs), powers[2], powers[3])
-
-
-@kernel
-def _prepare_powers(m, n, is_new, rings, powers):
-    """Bring the powers to m, from m - 1 unless ``is_new``."""
-    if is_new or m <= abs(n):
-        _fill_order_powers(m, n, rings, powers)
-    else:
-        multiply_powers(rings[0], powers[0], powers[1])
-
-
-@kernel
-def _signed_norm(m, n, central):
-    """Return the factor of the closed form of d^M_mn that does not depend on theta."""
-    n_abs = abs(n)
-    if m >= n_abs:
-        value, power = start_norm(m, n, central)
-        odd = (m - n) & 1
-    else:
-        value, power = start_norm(n_abs, m, central)
-        odd = ((n_abs - m) & 1) if n < 0 else 0
-    return (-value if odd else value), power
 
 
 @kernel
@@ -218,8 +186,8 @@ def fill_columns(
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
-            _prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
-            is_empty = first >= L
+            prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
+            is_empty = first >= L or high <= low
             columns_used = 0
             for slot in range(2):
                 if _is_active(run, slot, m, sides):
@@ -236,7 +204,7 @@ def fill_columns(
                     _fill_coefficients(
                         run, slot, k, columns_used, m, L, lowest, gathered, weights, scale, c
                     )
-            norm, norm_power = _signed_norm(m, n, tables[1])
+            norm, norm_power = signed_norm(m, n, tables[1])
             for start in range(low, high, RINGS):
                 inside = fill_start(
                     norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
@@ -249,6 +217,7 @@ def fill_columns(
                     lowest,
                     L,
                     columns_used,
+                    PADDING,
                     inside,
                     a,
                     shift,
@@ -292,12 +261,9 @@ def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm
         factor = sign * scale[el]
         if alternates and el & 1:
             factor = -factor
-        real, imaginary = 0.0, 0.0
         place = (el * columns_used + k) * WIDTH
-        for lane in range(WIDTH):
-            real += sums[place + lane]
-            imaginary += sums[place + WIDTH + lane]
-        flm[target, el * el + el + sigma * m] += factor * weights[i, el] * complex(real, imaginary)
+        value = complex(sum_lanes(sums, place), sum_lanes(sums, place + WIDTH))
+        flm[target, el * el + el + sigma * m] += factor * weights[i, el] * value
 
 
 @kernel
@@ -327,17 +293,17 @@ def add_columns_to_harmonics(
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
-            _prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
+            prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
             columns_used = 0
             for slot in range(2):
                 columns_used += 2 if _is_active(run, slot, m, sides) else 0
-            if columns_used == 0 or first >= L:
+            if columns_used == 0 or first >= L or windows[1, m] <= windows[0, m]:
                 continue
             _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
             filled = n
             a, scale = recursion[0], recursion[2]
             sums[first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
-            norm, norm_power = _signed_norm(m, n, tables[1])
+            norm, norm_power = signed_norm(m, n, tables[1])
             for start in range(windows[0, m], windows[1, m], RINGS):
                 inside = fill_start(
                     norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
@@ -354,6 +320,7 @@ def add_columns_to_harmonics(
                     lowest,
                     L,
                     columns_used,
+                    PADDING,
                     inside,
                     a,
                     shift,

@@ -1,7 +1,7 @@
 """Sums over degrees for every ring, and their adjoints, for one block of rings at one (m, n).
 
 A block passes three stages. While all its rings are out of range, the degree only advances; while
-some are, the sums of the others are formed, `PADDING` degrees at a time; once none is, one call
+some are, the sums of the others are formed, a few degrees at a time; once none is, one call
 runs to the end. The columns c or g hold two real numbers for each complex series. Each tile is
 called from one place only: every call is another copy of its machine code.
 """
@@ -17,7 +17,7 @@ from spinsdw.compiled.vectors import (
     add_to_rings_4,
     advance,
 )
-from spinsdw.compiled.wigner_recursion import PADDING, rescale
+from spinsdw.compiled.wigner_recursion import rescale
 
 __all__ = ["add_block_to_degrees", "sum_block"]
 
@@ -41,26 +41,27 @@ def _mask_outside(scale, columns, g, masked):
 
 
 @kernel
-def _next_pairs(el, lowest, L, is_inside, is_silent):
+def _next_pairs(el, lowest, L, look, is_inside, is_silent):
     """Return how many pairs of degrees the next call takes."""
     if not is_inside:
-        return PADDING // 2
+        return look // 2
     return (lowest - el) // 2 if is_silent else (L - el + 1) // 2
 
 
 @kernel
-def sum_block(first, lowest, L, columns, inside, a, b, c, x, before, now, scale, sums):
+def sum_block(first, lowest, L, columns, look, inside, a, b, c, x, before, now, scale, sums):
     """sums[k, r] = sum_{l=first}^{L-1} c[l, k] u_l(x_r); c is zero below ``lowest``.
 
-    ``inside`` counts the rings in range at the first degree.
+    ``inside`` counts the rings in range at the first degree; ``look``, even and up to `PADDING`,
+    is the number of degrees between two looks at the exponents.
     """
     for i in range(columns * RINGS):
         sums[i] = 0.0
     el = first
     while el < L:
         is_inside = inside == RINGS
-        is_silent = inside == 0 or el + PADDING <= lowest
-        pairs = _next_pairs(el, lowest, L, is_inside, is_silent)
+        is_silent = inside == 0 or el + look <= lowest
+        pairs = _next_pairs(el, lowest, L, look, is_inside, is_silent)
         if is_silent:
             advance(a, b, c, x, before, now, sums, el, pairs)
         elif columns == 4:
@@ -77,18 +78,18 @@ def sum_block(first, lowest, L, columns, inside, a, b, c, x, before, now, scale,
 
 @kernel
 def add_block_to_degrees(
-    first, lowest, L, columns, inside, a, b, g, masked, x, before, now, scale, sums
+    first, lowest, L, columns, look, inside, a, b, g, masked, x, before, now, scale, sums
 ):
     """sums[l, k, lane] += sum_r g[k, r] u_l(x_r) over the rings of each lane, lowest <= l < L.
 
-    ``inside`` counts the rings in range at the first degree.
+    ``inside`` and ``look`` as in `sum_block`.
     """
     el = first
     _mask_outside(scale, columns, g, masked)
     while el < L:
         is_inside = inside == RINGS
-        is_silent = inside == 0 or el + PADDING <= lowest
-        pairs = _next_pairs(el, lowest, L, is_inside, is_silent)
+        is_silent = inside == 0 or el + look <= lowest
+        pairs = _next_pairs(el, lowest, L, look, is_inside, is_silent)
         if is_silent:
             advance(a, b, g, x, before, now, sums, el, pairs)
         elif columns == 4:

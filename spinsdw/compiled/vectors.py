@@ -7,6 +7,8 @@ One tile handles ``RINGS = VECTORS * WIDTH`` rings at one (m, n): it runs the re
 - ``add_to_degrees_*``  adds ``g[k, r] u[l, r]`` to the sums of the degrees (adjoint);
 - ``advance``           does neither.
 
+``sum_lanes`` adds up the lanes of one vector of the sums of the degrees.
+
 Numba's own vectoriser keeps the sums in memory and uses half the vector width of the machine; the
 explicit form keeps them in registers, which is worth a factor of three. ``docs/engine`` explains.
 The plain loops below define what the vector forms compute; they run where numba is switched off.
@@ -30,6 +32,7 @@ __all__ = [
     "add_to_rings_2",
     "add_to_rings_4",
     "advance",
+    "sum_lanes",
 ]
 
 
@@ -258,13 +261,55 @@ def _make_plain_degree_tile(rings: int, columns: int, width: int) -> Any:
     return tile
 
 
+def _make_lane_sum(width: int) -> Any:
+    """Build sum_lanes(sums, place): the sum of ``width`` values from ``place`` on, by halves."""
+
+    @intrinsic
+    def lane_sum(typing, sums, place):  # noqa: ARG001
+        sig = types.float64(sums, place)
+
+        def codegen(context, builder, sig, args):
+            (pointer,) = _pointers(context, builder, sig, args, 1)
+            value = _Emitter(builder, width).load(pointer, args[1])
+            size = width
+            while size > 1:
+                size //= 2
+                halves = []
+                for first in (0, size):
+                    lanes = list(range(first, first + size))
+                    index = ir.Constant(ir.VectorType(ir.IntType(32), size), lanes)
+                    undefined = ir.Constant(value.type, ir.Undefined)
+                    halves.append(builder.shuffle_vector(value, undefined, index))
+                value = builder.fadd(*halves)
+            return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+
+        return sig, codegen
+
+    return lane_sum
+
+
+def _make_plain_lane_sum(width: int) -> Any:
+    """Build what `_make_lane_sum` computes, in the same order."""
+
+    def lane_sum(sums, place):
+        values = [sums[place + lane] for lane in range(width)]
+        while len(values) > 1:
+            half = len(values) // 2
+            values = [values[i] + values[half + i] for i in range(half)]
+        return values[0]
+
+    return lane_sum
+
+
 if config.DISABLE_JIT:
+    sum_lanes = _make_plain_lane_sum(WIDTH)
     add_to_rings_4 = _make_plain_ring_tile(RINGS, 4)
     add_to_rings_2 = _make_plain_ring_tile(RINGS, 2)
     advance = _make_plain_ring_tile(RINGS, 0)
     add_to_degrees_4 = _make_plain_degree_tile(RINGS, 4, WIDTH)
     add_to_degrees_2 = _make_plain_degree_tile(RINGS, 2, WIDTH)
 else:
+    sum_lanes = _make_lane_sum(WIDTH)
     add_to_rings_4 = _make_ring_tile(VECTORS, 4, WIDTH)
     add_to_rings_2 = _make_ring_tile(VECTORS, 2, WIDTH)
     advance = _make_ring_tile(VECTORS, 0, WIDTH)

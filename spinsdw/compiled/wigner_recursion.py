@@ -30,7 +30,9 @@ __all__ = [
     "fill_recursion",
     "fill_start",
     "multiply_powers",
+    "prepare_powers",
     "rescale",
+    "signed_norm",
     "start_norm",
 ]
 
@@ -124,6 +126,37 @@ def start_norm(M, K, central):
             value *= 2.0**512
             power -= 256.0
     return math.sqrt(value), power
+
+
+@kernel
+def _fill_order_powers(m, n, rings, powers):
+    """Fill sin(theta)^(M - |K|) and (1 +- cos(theta))^|K|: all of d^M_mn that depends on theta."""
+    sine, plus, minus = rings[0], rings[1], rings[2]
+    n_abs = abs(n)
+    fill_powers(sine, abs(m - n_abs), powers[0], powers[1])
+    fill_powers(plus if n >= 0 else minus, min(m, n_abs), powers[2], powers[3])
+
+
+@kernel
+def prepare_powers(m, n, is_new, rings, powers):
+    """Bring the powers to m, from m - 1 unless ``is_new``."""
+    if is_new or m <= abs(n):
+        _fill_order_powers(m, n, rings, powers)
+    else:
+        multiply_powers(rings[0], powers[0], powers[1])
+
+
+@kernel
+def signed_norm(m, n, central):
+    """Return the factor of the closed form of d^M_mn that does not depend on theta."""
+    n_abs = abs(n)
+    if m >= n_abs:
+        value, power = start_norm(m, n, central)
+        odd = (m - n) & 1
+    else:
+        value, power = start_norm(n_abs, m, central)
+        odd = ((n_abs - m) & 1) if n < 0 else 0
+    return (-value if odd else value), power
 
 
 @kernel

@@ -92,11 +92,12 @@ def correlate_with_energy(
     sums = OrderSums(orders, weights, threads=resolve_threads(threads))
     RingEngine(bandlimit, grid.colatitudes).fill_columns(holes[None], sums, mixing, columns)
     shares = np.empty((gammas.size, *grid.shape))
-    sizes = np.full(grid.n_rings, grid.n_phi)
-    starts = np.arange(grid.n_rings) * grid.n_phi
+    rings = np.arange(grid.n_rings)
+    sizes, limits = np.full_like(rings, grid.n_phi), np.full_like(rings, bandlimit)
+    geometry = (rings, sizes, np.zeros(grid.n_rings), limits, rings[None] * grid.n_phi)
     folded = np.empty(grid.n_rings * grid.n_phi, dtype=np.complex128)
-    for column, share in zip(columns, shares, strict=True):
-        fill_folded(bandlimit, column, 0, sizes, np.zeros(grid.n_rings), starts, False, folded)
+    for column, share in zip(columns[:, None], shares, strict=True):
+        fill_folded(column, *geometry, False, folded)
         rows = folded.reshape(grid.shape)
         from_series(rows, rows)
         share[...] = rows.real

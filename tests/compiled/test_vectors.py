@@ -87,6 +87,22 @@ def test_degree_tiles_are_the_plain_sums_over_rings(width, count, columns):
         assert_same(found, desired, 2 * pairs + 1)
 
 
+@needs_compiler
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+def test_lanes_are_added_in_the_order_of_the_plain_form(width):
+    values = np.random.default_rng(0).standard_normal(24)
+    lane_sum = vectors._make_lane_sum(width)
+
+    @numba.njit
+    def call(sums, place):
+        return lane_sum(sums, place)
+
+    plain = vectors._make_plain_lane_sum(width)
+    for place in range(values.size - width):
+        assert call(values, place) == plain(values, place)
+        assert_close(plain(values, place), values[place : place + width].sum(), ulps=16)
+
+
 @pytest.mark.parametrize("columns", [2, 4])
 def test_the_two_plain_sums_are_adjoint(columns):
     """<sum_l c u, g> over rings = <c, sum_r g u> over degrees, the lanes added up."""

@@ -19,7 +19,7 @@ from spinsdw.separation.skies import GridSky, HealpixSky
 from spinsdw.separation.smooth_masks import SmoothMasks
 from spinsdw.simulation import simulate_eb
 from spinsdw.spin_transform import SpinHarmonicTransform
-from tests.helpers import EPS, needs_compiler
+from tests.helpers import EPS, assert_close, needs_compiler
 from tests.separation.test_smooth_masks import cap, footprint
 
 L, SIGNAL = 160, 24
@@ -94,7 +94,8 @@ def test_maps_of_a_stack_and_threads_do_not_see_each_other():
     found = pure_harmonics(sky, smooth, stack)
     assert found.shape == (3, 33**2)
     for one, p in zip(found, stack, strict=True):
-        assert np.array_equal(one, pure_harmonics(sky, smooth, p))
+        # Transforms of several maps round in another order.
+        assert_close(one, pure_harmonics(sky, smooth, p), ulps=1024)
     two = HealpixSky(16, 33, threads=2)
     assert np.array_equal(found, pure_harmonics(two, smooth, stack))
 

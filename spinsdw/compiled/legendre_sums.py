@@ -1,0 +1,322 @@
+"""From harmonic coefficients to Fourier columns on symmetric rings, by functions of order 0.
+
+A series F_n(+-m) of order n, times sin(theta)^|n|, is one of order 0 and |n| more degrees
+(`legendre_recursion`). Those have a parity in x = cos(theta), so that one value r_k serves
+
+    sin^|n| F(theta) = E + x O ,    sin^|n| F(pi - theta) = E - x O ,
+
+with E and O two sums over k: four real columns for every two degrees. The rings given are those of
+the northern half, the equator included; columns are complex arrays [map, m, ring] of all rings, -m
+at place n_m - m.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.legendre_recursion import (
+    fill_lowering,
+    fill_parity_recursion,
+    lower_order,
+    raise_order,
+)
+from spinsdw.compiled.order_sums import M_CHUNK
+from spinsdw.compiled.ring_sums import add_block_to_degrees, sum_block
+from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
+from spinsdw.compiled.wigner_recursion import PADDING, fill_start, prepare_powers, signed_norm
+
+__all__ = ["add_mirrored_to_harmonics", "fill_mirrored_columns"]
+
+# A step is two degrees.
+_LOOK = PADDING // 2
+
+
+@kernel
+def _prepare_order(
+    m, n, L, tables, rings, powers, is_new, window, recursion, mixers, factors, state, inside
+):
+    """Fill the recursion of m, and u_0 and the exponents of all rings in the window."""
+    a, b, shifted, scale, ratios = recursion
+    size = abs(n)
+    count = (L + size - m + 1) // 2
+    fill_parity_recursion(m, count, ratios, a, b, shifted, scale)
+    inverse_roots = tables[3][m:]
+    here, above, odd = mixers[0], mixers[1], mixers[2]
+    for k in range(count):
+        here[k] = scale[k] * (ratios[2 * k + 1] * inverse_roots[2 * k])
+        above[k] = scale[k] * (ratios[2 * k + 2] * inverse_roots[2 * k + 2])
+        odd[k] = scale[k] * inverse_roots[2 * k + 1]
+    for i in range(size):
+        fill_lowering(m, i + 1, L + size - 1 - i, tables[4][i], factors[i])
+    for k in range(count, count + PADDING):
+        a[k] = 0.0
+        b[k] = 0.0
+        shifted[k] = 0.0
+    prepare_powers(m, 0, is_new, rings, powers)
+    norm, norm_power = signed_norm(m, 0, tables[1])
+    norm *= math.sqrt((2.0 * m + 1.0) * (2.0 * m + 3.0))
+    for start in range(window[0], window[1], RINGS):
+        block = state[:, start : start + RINGS]
+        inside[start // RINGS] = fill_start(
+            norm, norm_power, powers, start, block[0], block[1], block[2], block[3]
+        )
+    return count
+
+
+@kernel
+def _fill_series(m, side, n, L, factors, flm, weights, series):
+    """Fill c_l of sum_l c_l d^l_m0 = sin^|n| F_n(+-m), m <= l < L + |n|; return which series."""
+    size = abs(n)
+    order_sign = 1.0 if (n > 0) == (side == 0) else -1.0
+    sign = -1.0 if side == 1 and (m + n) & 1 else 1.0
+    signed_m = m if side == 0 else -m
+    first = max(m, size)
+    for part in range(2):
+        series[0, part, m:first] = 0.0
+        series[0, part, L : L + 3] = 0.0
+    values, weight = flm[first * first + first + signed_m :], weights[first:]
+    real, imaginary = series[0, 0, first:], series[0, 1, first:]
+    place = 0
+    for i in range(L - first):
+        value = (sign * weight[i]) * values[place]
+        real[i] = value.real
+        imaginary[i] = value.imag
+        place += 2 * (first + i + 1)
+    for i in range(size):
+        lower_order(m, order_sign, L + i, factors[size - 1 - i], series[i & 1], series[1 - (i & 1)])
+    return size & 1
+
+
+@kernel
+def _fill_coefficients(m, count, series, mixers, c):
+    """c[k] = (even, odd) sums' coefficients of u_k, each as real and imaginary part."""
+    here, above, odd = mixers[0], mixers[1], mixers[2]
+    real, imaginary = series[0, m:], series[1, m:]
+    for k in range(count):
+        c[4 * k] = here[k] * real[2 * k] + above[k] * real[2 * k + 2]
+        c[4 * k + 1] = here[k] * imaginary[2 * k] + above[k] * imaginary[2 * k + 2]
+        c[4 * k + 2] = odd[k] * real[2 * k + 1]
+        c[4 * k + 3] = odd[k] * imaginary[2 * k + 1]
+    c[4 * count : 4 * (count + PADDING)] = 0.0
+
+
+@kernel
+def _store_block(first, start, n_rings, sums, cosine, factor, column):
+    """Write both hemispheres of a block of rings into a column."""
+    total = column.size
+    for r in range(min(RINGS, n_rings - start)):
+        ring = start + r
+        x, size = cosine[ring], factor[ring]
+        even = complex(sums[r], sums[RINGS + r])
+        odd = x * complex(sums[2 * RINGS + r], sums[3 * RINGS + r])
+        column[first + ring] = size * (even + odd)
+        column[total - 1 - first - ring] = size * (even - odd)
+
+
+@kernel
+def _copy_state(state, start, u):
+    for i in range(3):
+        for r in range(RINGS):
+            u[i, r] = state[i, start + r]
+
+
+@kernel
+def _arguments(start, rings, recursion):
+    """Return the argument of the recursion that is exact on the block, and its shift."""
+    is_polar = rings[0][start] < 0.7
+    x = rings[4] if is_polar else rings[3]
+    return x[start : start + RINGS], recursion[2] if is_polar else recursion[1]
+
+
+@kernel
+def _workspace(L, n, padded):
+    size = L + abs(n) + PADDING
+    recursion = (np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size))
+    state, powers = np.empty((4, padded)), np.empty((4, padded))
+    powers[2] = 1.0
+    powers[3] = 0.0
+    return recursion, state, powers, np.empty(padded // RINGS + 1, dtype=np.int64)
+
+
+@kernel
+def _series_workspace(L, n):
+    size = L + abs(n) + 4
+    return np.empty((3, size)), np.empty((abs(n), 3, size)), np.empty((2, 2, size))
+
+
+@kernel
+def fill_mirrored_columns(
+    first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, columns
+):
+    """Fill columns[i, m, ring] = sum_l weights[l] flm[i, lm] d^l_mn(theta), both hemispheres.
+
+    flm: (maps, L*L); weights: (L,) complex; rings: (sin, 1 + cos, 1 - cos, cos^2, -sin^2, cos,
+    sin^-|n|) of the northern rings from ``first_ring`` on and RINGS more; windows: (2, L) first
+    and last of them that matter at each m, others are left alone; tables: (sqrt(k), central
+    binomials, 1 / k, 1 / sqrt(2k + 1), (|n|, 3, L) the parts of U_l, V_l, W_l that depend on l and
+    n); columns: (maps, n_m, all rings), of m >= 0 only for ``sides`` = 1.
+    """
+    padded, n_m = rings[0].size, columns.shape[1]
+    n_rings = padded - RINGS
+    recursion, state, powers, inside = _workspace(L, n, padded)
+    u = np.empty((3, RINGS))
+    sums, c = np.empty(4 * RINGS), np.empty(4 * (L + abs(n) + PADDING))
+    mixers, factors, series = _series_workspace(L, n)
+    for m in range(first_m, stop_m):
+        low, high = windows[0, m], windows[1, m]
+        is_new = m == first_m or m % M_CHUNK == 0
+        count = _prepare_order(
+            m,
+            n,
+            L,
+            tables,
+            rings,
+            powers,
+            is_new,
+            windows[:, m],
+            recursion,
+            mixers,
+            factors,
+            state,
+            inside,
+        )
+        for i in range(flm.shape[0]):
+            for side in range(sides if m > 0 else 1):
+                last = _fill_series(m, side, n, L, factors, flm[i], weights, series)
+                _fill_coefficients(m, count, series[last], mixers, c)
+                column = columns[i, m if side == 0 else n_m - m]
+                for start in range(low, high, RINGS):
+                    x, shift = _arguments(start, rings, recursion)
+                    _copy_state(state, start, u)
+                    sum_block(
+                        0,
+                        0,
+                        count,
+                        4,
+                        _LOOK,
+                        inside[start // RINGS],
+                        recursion[0],
+                        shift,
+                        c,
+                        x,
+                        u[0],
+                        u[1],
+                        u[2],
+                        sums,
+                    )
+                    _store_block(first_ring, start, n_rings, sums, rings[5], rings[6], column)
+
+
+@kernel
+def _load_block(first, start, n_rings, column, cosine, factor, g):
+    """Split a block of a column into its even and its odd part, zero beyond the last ring."""
+    total = column.size
+    for r in range(RINGS):
+        ring = start + r
+        north, south, x = 0.0j, 0.0j, 0.0
+        if ring < n_rings:
+            x = cosine[ring]
+            north = factor[ring] * column[first + ring]
+            # The equator is its own mirror image: it counts once.
+            if 2 * (first + ring) + 1 != total:
+                south = factor[ring] * column[total - 1 - first - ring]
+        even, odd = north + south, x * (north - south)
+        g[r] = even.real
+        g[RINGS + r] = even.imag
+        g[2 * RINGS + r] = odd.real
+        g[3 * RINGS + r] = odd.imag
+
+
+@kernel
+def _collect(m, count, sums, mixers, series):
+    """Fill sum_ring d^l_m0 g, m <= l < m + 2 count, from the lanes of the sums of u_k g."""
+    here, above, odd = mixers[0], mixers[1], mixers[2]
+    for part in range(2):
+        out = series[part, m:]
+        before = 0.0
+        for k in range(count):
+            place = (4 * k + part) * WIDTH
+            even = sum_lanes(sums, place)
+            out[2 * k] = here[k] * even + before
+            out[2 * k + 1] = odd[k] * sum_lanes(sums, place + 2 * WIDTH)
+            before = above[k] * even
+
+
+@kernel
+def _add_series(m, side, n, L, factors, series, weights, flm):
+    """Transpose of `_fill_series`: add what ``series`` holds for order 0 to the coefficients."""
+    size = abs(n)
+    order_sign = 1.0 if (n > 0) == (side == 0) else -1.0
+    sign = -1.0 if side == 1 and (m + n) & 1 else 1.0
+    signed_m = m if side == 0 else -m
+    for i in range(size):
+        raise_order(m, order_sign, L + size - 1 - i, factors[i], series[i & 1], series[1 - (i & 1)])
+    first = max(m, size)
+    values, weight = flm[first * first + first + signed_m :], weights[first:]
+    real, imaginary = series[size & 1, 0, first:], series[size & 1, 1, first:]
+    place = 0
+    for i in range(L - first):
+        values[place] += (sign * weight[i]) * complex(real[i], imaginary[i])
+        place += 2 * (first + i + 1)
+
+
+@kernel
+def add_mirrored_to_harmonics(
+    first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, flm
+):
+    """flm[i, lm] += weights[l] sum_ring d^l_mn(theta) columns[i, m, ring], both hemispheres.
+
+    Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
+    """
+    padded, n_m = rings[0].size, columns.shape[1]
+    recursion, state, powers, inside = _workspace(L, n, padded)
+    u, g, masked = np.empty((3, RINGS)), np.empty(4 * RINGS), np.empty(4 * RINGS)
+    sums = np.empty(4 * WIDTH * (L + abs(n) + PADDING))
+    mixers, factors, series = _series_workspace(L, n)
+    for m in range(first_m, stop_m):
+        is_new = m == first_m or m % M_CHUNK == 0
+        count = _prepare_order(
+            m,
+            n,
+            L,
+            tables,
+            rings,
+            powers,
+            is_new,
+            windows[:, m],
+            recursion,
+            mixers,
+            factors,
+            state,
+            inside,
+        )
+        for i in range(flm.shape[0]):
+            for side in range(sides if m > 0 else 1):
+                sums[: 4 * WIDTH * (count + PADDING)] = 0.0
+                column = columns[i, m if side == 0 else n_m - m]
+                for start in range(windows[0, m], windows[1, m], RINGS):
+                    x, shift = _arguments(start, rings, recursion)
+                    _copy_state(state, start, u)
+                    _load_block(first_ring, start, padded - RINGS, column, rings[5], rings[6], g)
+                    add_block_to_degrees(
+                        0,
+                        0,
+                        count,
+                        4,
+                        _LOOK,
+                        inside[start // RINGS],
+                        recursion[0],
+                        shift,
+                        g,
+                        masked,
+                        x,
+                        u[0],
+                        u[1],
+                        u[2],
+                        sums,
+                    )
+                _collect(m, count, sums, mixers, series[0])
+                _add_series(m, side, n, L, factors, series, weights, flm[i])
