@@ -8,7 +8,6 @@ on sky maps; the longitude zero is in the middle.  Hidden sky is light grey.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,9 +15,9 @@ import numpy as np
 
 from spinsdw.errors import DataError, MissingPackageError, ParameterError, ShapeError
 from spinsdw.files import atomic_output, output_path
-from spinsdw.healpix import bad_pixel_mask, nside_of
+from spinsdw.healpix import bad_pixel_mask
 from spinsdw.maps_io import HealpixMap
-from spinsdw.sampling import MW, MWSS, Sampling
+from spinsdw.projections import Projection
 
 if TYPE_CHECKING:
     import os
@@ -35,6 +34,7 @@ __all__ = [
     "figure_grid",
     "mollweide_figure",
     "plot_mollweide",
+    "plot_projection",
     "plot_tiling",
     "save_figure",
     "tiling_figure",
@@ -49,36 +49,6 @@ HIDDEN_COLOUR = "#d4d4d4"
 LINE_COLOUR = "#444444"
 RASTER_ROWS = 600
 ROBUST_PERCENTILE = 99.5
-
-
-@dataclass(frozen=True)
-class _Raster:
-    """Directions of the picture's points, nan outside the ellipse; row 0 is the north."""
-
-    colatitudes: NDArray[np.float64]
-    longitudes: NDArray[np.float64]
-
-    @classmethod
-    def mollweide(cls, rows: int) -> _Raster:
-        """Invert x = 2 (phi / pi) cos t, y = sin t, where 2 t + sin 2 t = pi sin(latitude)."""
-        y = (1 - (2 * np.arange(rows) + 1) / rows)[:, None]
-        x = 2 * ((2 * np.arange(2 * rows) + 1) / (2 * rows) - 1)[None, :]
-        auxiliary = np.arcsin(y)
-        latitudes = np.arcsin((2 * auxiliary + np.sin(2 * auxiliary)) / np.pi)
-        # Minus, because east is to the left.
-        longitudes = -np.pi * x / (2 * np.cos(auxiliary))
-        inside = np.abs(longitudes) <= np.pi
-        colatitudes = np.where(inside, np.pi / 2 - latitudes, np.nan)
-        return cls(colatitudes, np.where(inside, longitudes % (2 * np.pi), np.nan))
-
-    def picture(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the value nearest to each point, nan outside the ellipse."""
-        inside = np.isfinite(self.colatitudes)
-        colatitudes, longitudes = self.colatitudes[inside], self.longitudes[inside]
-        nearest = _nearest_pixels if values.ndim == 1 else _nearest_samples
-        picture = np.full(inside.shape, np.nan)
-        picture[inside] = nearest(values, colatitudes, longitudes)
-        return picture
 
 
 def plot_mollweide(  # noqa: PLR0913 - what a reader of a map has to be told
@@ -141,11 +111,79 @@ def plot_mollweide(  # noqa: PLR0913 - what a reader of a map has to be told
     values = _visible(sky, mask)
     low, high = _limits(values, limits)
     colours = colour_map or (SIGNED_COLOURS if low < 0 < high else UNSIGNED_COLOURS)
-    image = _draw_sky(axes, _Raster.mollweide(RASTER_ROWS).picture(values), colours)
+    picture = Projection(rows=RASTER_ROWS).raster.picture(values)
+    image = _draw_sky(axes, picture, colours)
     image.set_clim(low, high)
     axes.set_title(title)
-    known = sky.unit if isinstance(sky, HealpixMap) and sky.unit != "unknown" else ""
-    _draw_colour_bar(axes, image, values, known if unit is None else unit)
+    _draw_colour_bar(axes, image, values, _unit_of(sky) if unit is None else unit)
+    return image
+
+
+def plot_projection(  # noqa: PLR0913 - what a reader of a map has to be told
+    axes: Axes,
+    sky: Sky,
+    projection: Projection,
+    *,
+    title: str = "",
+    unit: str | None = None,
+    mask: ArrayLike | None = None,
+    limits: Limits | None = None,
+    colour_map: str | None = None,
+) -> AxesImage:
+    """Draw a map in any projection, with its colour bar: a patch of the sky, or all of it.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Ordinary axes; their frame is taken away.
+    sky : HealpixMap, or array_like, real
+        As for `plot_mollweide`. Of a field with spin draw the parts of
+        `spinsdw.projections.project_map`, whose frame is the picture's.
+    projection : Projection
+        Such as ``Projection("gnomonic", centre=(0.5, 1.0), radius=0.2)``.
+    title, unit, mask, limits, colour_map
+        As for `plot_mollweide`.
+
+    Returns
+    -------
+    matplotlib.image.AxesImage
+        The picture; coordinates of the axes are those of the plane of projection.
+
+    Raises
+    ------
+    MissingPackageError, ShapeError, DataError, ParameterError
+        As for `plot_mollweide`.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> sky = np.arange(48) - 24.0
+    >>> image = plot_projection(Figure().subplots(), sky, Projection("orthographic", rows=50))
+    >>> image.get_array().shape
+    (50, 50)
+    """
+    _require_matplotlib()
+    values = _visible(sky, mask)
+    low, high = _limits(values, limits)
+    colours = colour_map or (SIGNED_COLOURS if low < 0 < high else UNSIGNED_COLOURS)
+    width, height = projection.half_size
+    image = axes.imshow(
+        projection.raster.picture(values),
+        extent=(-width, width, -height, height),
+        cmap=_palette(colours),
+        interpolation="nearest",
+    )
+    outside = np.isnan(projection.raster.colatitudes)
+    # White above the grey of hidden sky, and clear within the edge.
+    axes.imshow(
+        np.where(outside[..., None], 1.0, [1.0, 1.0, 1.0, 0.0]) * np.ones((1, 1, 4)),
+        extent=image.get_extent(),
+        interpolation="nearest",
+    )
+    image.set_clim(low, high)
+    axes.set_title(title)
+    axes.set_axis_off()
+    _draw_colour_bar(axes, image, values, _unit_of(sky) if unit is None else unit)
     return image
 
 
@@ -422,49 +460,23 @@ def _robust_limits(shown: NDArray[np.float64]) -> Limits:
     return (float(inner[0]), float(inner[1])) if inner[0] < inner[1] else (low, high)
 
 
-def _nearest_pixels(
-    values: NDArray[np.float64],
-    colatitudes: NDArray[np.float64],
-    longitudes: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    import healpy
-
-    return values[healpy.ang2pix(nside_of(values), colatitudes, longitudes)]
+def _unit_of(sky: Sky) -> str:
+    return sky.unit if isinstance(sky, HealpixMap) and sky.unit != "unknown" else ""
 
 
-def _nearest_samples(
-    values: NDArray[np.float64],
-    colatitudes: NDArray[np.float64],
-    longitudes: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    grid = _grid_of(values.shape)
-    between = (grid.colatitudes[1:] + grid.colatitudes[:-1]) / 2
-    rings = np.searchsorted(between, colatitudes)
-    points = np.rint(longitudes * grid.n_phi / (2 * np.pi)).astype(np.int64) % grid.n_phi
-    return values[rings, points]
-
-
-def _grid_of(shape: tuple[int, ...]) -> Sampling:
-    if len(shape) == 2:
-        rings, points = shape
-        if rings >= 1 and points == 2 * rings - 1:
-            return MW(rings)
-        if rings >= 2 and points == 2 * rings - 2:
-            return MWSS(rings - 1)
-    msg = (
-        f"map has shape {shape}; it must be HEALPix (12 nside**2,), MW (L, 2L-1) or MWSS (L+1, 2L)."
-    )
-    raise ShapeError(msg)
-
-
-def _draw_sky(axes: Axes, picture: NDArray[np.float64], colours: str) -> AxesImage:
+def _palette(colours: str) -> Any:
     from matplotlib import colormaps
-    from matplotlib.patches import Ellipse
 
     if colours not in colormaps:
         msg = f"colour_map={colours!r} must be a colour map of matplotlib, such as 'RdBu_r'."
         raise ParameterError(msg)
-    palette = colormaps[colours].with_extremes(bad=HIDDEN_COLOUR)
+    return colormaps[colours].with_extremes(bad=HIDDEN_COLOUR)
+
+
+def _draw_sky(axes: Axes, picture: NDArray[np.float64], colours: str) -> AxesImage:
+    from matplotlib.patches import Ellipse
+
+    palette = _palette(colours)
     image = axes.imshow(picture, extent=(-2, 2, -1, 1), cmap=palette, interpolation="nearest")
     ellipse = Ellipse((0, 0), 4, 2, facecolor="none", edgecolor=LINE_COLOUR, linewidth=0.8)
     axes.add_patch(ellipse)

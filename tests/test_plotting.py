@@ -21,13 +21,14 @@ from spinsdw.healpix import UNSEEN
 from spinsdw.maps_io import HealpixMap
 from spinsdw.plotting import (
     HIDDEN_COLOUR,
-    _Raster,
     figure_grid,
     mollweide_figure,
     plot_mollweide,
+    plot_projection,
     plot_tiling,
     save_figure,
 )
+from spinsdw.projections import Projection
 from spinsdw.sampling import MW, MWSS
 from spinsdw.tiling import ScaleDiscretisedTiling
 from tests.helpers import assert_close
@@ -49,7 +50,7 @@ def axes():
 
 @pytest.fixture
 def raster():
-    return _Raster.mollweide(40)
+    return Projection(rows=40).raster
 
 
 def colours_of(figure):
@@ -76,7 +77,7 @@ def test_raster_inverts_the_mollweide_projection(raster):
 
 def test_raster_is_equal_area():
     """Every point of the picture stands for the same solid angle: the mean of z^2 is 1/3."""
-    raster = _Raster.mollweide(400)
+    raster = Projection(rows=400).raster
     inside = np.isfinite(raster.colatitudes)
     assert abs(np.mean(np.cos(raster.colatitudes[inside]) ** 2) - 1 / 3) < 1e-3
     assert abs(np.mean(inside) - np.pi / 4) < 1e-3
@@ -317,3 +318,27 @@ def test_labels_of_scales_do_not_overlap(axes):
     boxes = sorted((text.get_window_extent() for text in axes.texts), key=lambda box: box.x0)
     assert 3 < len(boxes) < len(tiling.scales)
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
+
+
+@pytest.mark.parametrize("name", ["orthographic", "gnomonic", "stereographic", "mercator"])
+def test_any_projection_is_drawn_with_its_edge_white(name, axes):
+    figure = axes.figure
+    sky = np.arange(192) - 90.0
+    projection = Projection(name, rows=60)
+    image = plot_projection(axes, sky, projection, title="sky", unit="K")
+    assert image.get_clim()[0] < 0 < image.get_clim()[1]
+    assert figure.axes[0].get_title() == "sky"
+    assert figure.axes[1].get_xlabel() == "K"
+    outside = np.isnan(projection.raster.colatitudes)
+    cover = figure.axes[0].images[1].get_array()
+    assert np.array_equal(cover[..., 3] == 1, outside)
+    assert np.array_equal(np.isnan(np.ma.filled(image.get_array(), np.nan)), outside)
+
+
+def test_masked_sky_within_a_projection_is_hidden(axes):
+    sky = np.ones(48)
+    mask = np.arange(48) < 24
+    image = plot_projection(axes, sky * np.arange(48), Projection(rows=40), mask=mask)
+    shown = np.ma.filled(image.get_array(), np.nan)
+    assert np.nanmax(shown) < 24
+    assert np.isnan(shown[-5, 40])
