@@ -9,20 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
+from spinsdw.harmonics import orders as orders_of
 from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.parallel import resolve_threads
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, writable
 
-__all__ = ["WignerTransform"]
+__all__ = ["WignerTransform", "check_orders"]
 
 Array = np.ndarray[Any, Any]
 
 
-def _check_orders(orders: Sequence[int], bandlimit: int) -> tuple[int, ...]:
+def check_orders(orders: Sequence[int], bandlimit: int) -> tuple[int, ...]:
+    """Return orders n as a tuple of ints, distinct, increasing and below the bandlimit in size."""
     if not isinstance(orders, Iterable):
         msg = f"orders={orders!r} must be a sequence of integers; pass a tuple."
         raise ParameterError(msg)
@@ -96,7 +98,7 @@ class WignerTransform:
         max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
-        checked = _check_orders(orders, bandlimit)
+        checked = check_orders(orders, bandlimit)
         real = check_flag(real, "real")
         if real and tuple(-n for n in reversed(checked)) != checked:
             msg = f"real=True needs orders symmetric about 0, not {checked}; add the missing signs."
@@ -283,3 +285,69 @@ class WignerTransform:
     def adjoint_analysis(self, coefficients: Array) -> Array:
         """Apply the adjoint of `analysis`; shapes and errors of `synthesis`."""
         return self._to_functions(coefficients, self._analysis_weights, quadrature=True)
+
+    def correlate(self, flm: Array, glm: Array) -> Array:
+        """Compare a field with another in every place and orientation: <f, R_rho g>.
+
+        Parameters
+        ----------
+        flm : ndarray, shape (..., bandlimit**2), complex
+            The field f; leading axes are a batch.
+        glm : ndarray, shape (bandlimit**2,), complex
+            The field g that is turned, of the same spin, which may be any; of orders in ``orders``
+            alone. With ``real`` both are real scalars.
+
+        Returns
+        -------
+        ndarray, shape (..., gammas, rings, phi), complex128 (float64 if ``real``)
+            The integral over the sphere of f times the conjugate of the turned g, at each sample.
+            Its Wigner coefficients are those of `rotation_group.correlate_fields`.
+
+        Raises
+        ------
+        ShapeError
+            If a last axis is not bandlimit**2 long, or g is a batch.
+        DataError
+            If a coefficient is not a finite number, or g has orders that the transform has not.
+        MemoryBudgetError
+            If the call would take more than ``max_memory``.
+
+        Examples
+        --------
+        >>> flm = np.arange(16) + 0j
+        >>> transform = WignerTransform(4, orders=range(-3, 4))
+        >>> energy = transform.correlate(flm, flm)[0, 0].real.max()
+        >>> bool(energy < np.vdot(flm, flm).real)
+        True
+        """
+        values = writable(check_flm(flm, self.bandlimit))
+        weights = self._correlation_weights(glm)
+        batch, sums = values.reshape(-1, self.bandlimit**2), self._sums
+        size = batch.shape[0] * math.prod(self.shape) * sums.maps_itemsize
+        estimate = MemoryEstimate(values.nbytes, size, sums.working_bytes)
+        estimate.require(self.max_memory, "correlate")
+        out = np.empty((batch.shape[0], *self.shape), dtype=sums.maps_dtype)
+        for one, function in zip(batch, out, strict=True):
+            sums.to_grid(one[None], weights, out=function)
+        return out.reshape(*values.shape[:-1], *self.shape)
+
+    def _correlation_weights(self, glm: Array) -> Array:
+        """conj(g_ln), one row for each of the orders."""
+        values = check_flm(glm, self.bandlimit, "glm")
+        if values.ndim != 1:
+            msg = f"glm has shape {values.shape}; it must be one field, ({self.bandlimit**2},)."
+            raise ShapeError(msg)
+        weights = np.zeros((len(self.orders), self.bandlimit), dtype=np.complex128)
+        rest = values.copy()
+        for row, n in zip(weights, self.orders, strict=True):
+            el = np.arange(abs(n), self.bandlimit)
+            row[abs(n) :] = values[el**2 + el + n].conj()
+            rest[el**2 + el + n] = 0.0
+        if np.any(rest):
+            missing = sorted(set(orders_of(self.bandlimit)[rest != 0].tolist()))
+            msg = (
+                f"glm has orders {missing} that are not among orders={self.orders}; "
+                "make the transform with them, or set them to zero."
+            )
+            raise DataError(msg)
+        return weights

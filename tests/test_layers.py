@@ -37,6 +37,7 @@ LAYERS = (  # bottom to top
     {"rotated_wavelets", "wigner_parts"},
     {"ring_transform", "spin_transform"},
     {"wigner_transform"},
+    {"rotation_group"},
     {"coefficients"},
     {"wavelet_transform"},
     {"vector_spaces"},
