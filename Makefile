@@ -54,6 +54,7 @@ tutorials: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	@$(BIN)/python benchmarks/smoke.py
+	@$(BIN)/python -m benchmarks.purity --setting tiny --folder build/purity
 
 clean:
 	rm -rf $(VENV) build dist output *.egg-info docs/_build docs/generated docs/gallery \

@@ -4,21 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+pytest.importorskip("matplotlib")
+
 from benchmarks.purity import DISTANCES, SETTINGS, SURVEYS, Result, SeparatorBands, Skies, judge
+from benchmarks.purity.__main__ import main as purity_main
 from benchmarks.purity.bands import evaluated_bands, synthesised_bands
+from benchmarks.purity.families import families
+from benchmarks.purity.figures import save_figures
 from benchmarks.purity.measures import Regions
+from benchmarks.purity.pictures import PIXELS, disc_of_sky, maps_figure
 from benchmarks.purity.ratio import Powers, RatioTest, estimate_ratio, measure_ratio
+from benchmarks.purity.report import all_tables, tables
+from benchmarks.purity.results import add_result, read_results
 from benchmarks.purity.skies import KINDS
 from benchmarks.purity.surveys import survey_mask
+from spinsdw.healpix import pixel_directions
 from spinsdw.masks import distance_to_edge, fill_holes
+from spinsdw.separation import Pseudo
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import assert_close, random_real_flm
 
 TINY = SETTINGS["tiny"]
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
@@ -214,3 +226,105 @@ def test_shift_of_the_true_b_is_zero():
     assert found.found.size == 10
     again = RatioTest.from_json(json.loads(json.dumps(found.to_json())))
     assert abs(again.sigma - found.sigma) < 1e-5
+
+
+# The report
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """Results of two methods behind every mask, with a second choice of one of them."""
+    folder = tmp_path_factory.mktemp("results")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tempfile.tempdir", str(folder))
+        for survey in SURVEYS:
+            for method in ("masked", Pseudo(), Pseudo(0.5)):
+                add_result(judge(method, survey, TINY, (200,)), folder)
+        add_result(judge("masked", "D", TINY, (200,), model="shear"), folder)
+    return folder
+
+
+def test_results_of_other_seeds_join_and_of_the_same_seeds_replace(tmp_path):
+    one, other = (judge("masked", "B", TINY, (seed,)) for seed in (200, 201))
+    for result in (one, other, one):
+        add_result(result, tmp_path)
+    (found,) = read_results("tiny", tmp_path)
+    assert found.seeds == (200,)
+    add_result(other, tmp_path)
+    (found,) = read_results("tiny", tmp_path)
+    assert found.seeds == (200, 201)
+
+
+def test_family_takes_the_best_choice_of_each_band(kept):
+    family = next(
+        family for family in families(read_results("tiny", kept), "A") if family.label == "pseudo"
+    )
+    one, other = family.results
+    np.testing.assert_array_equal(
+        family.f_ret(1e-1), np.maximum(one.f_ret(1e-1), other.f_ret(1e-1))
+    )
+    for row in range(len(family.scales)):
+        found = family.at("r_leak", 1)[row]
+        assert found in {one.at("r_leak", 1)[row], other.at("r_leak", 1)[row]}
+
+
+def test_frontier_falls_with_the_sky(kept):
+    """No point of a curve is beaten in both: less sky, less leakage."""
+    for family in families(read_results("tiny", kept), "A"):
+        for scale in family.scales:
+            sky, leak = family.frontier(scale)
+            assert np.all(np.diff(sky) <= 0)
+            assert np.all(np.diff(leak) <= 0)
+
+
+def test_report_has_every_method_mask_and_quoted_row(kept):
+    text = tables(TINY, kept)
+    for survey, (description, _) in SURVEYS.items():
+        assert f"Mask {survey}, {description}" in text
+    assert text.count("NaMaster, quoted") == 6
+    assert "Cosmic shear behind mask D" in text
+    leak = next(r for r in read_results("tiny", kept) if (r.method, r.survey) == ("masked", "A"))
+    row = next(line for line in text.split("Leakage r_leak")[1].splitlines() if "masked" in line)
+    assert f"{leak.at('r_leak', 1)[0]:.0e}".replace("e-0", "e-") in row
+
+
+def test_pictures_are_drawn(kept, tmp_path, skies):
+    names = save_figures(read_results("tiny", kept), tmp_path)
+    assert {f"purity_leakage_{survey}" for survey in SURVEYS} < set(names)
+    assert all((tmp_path / f"{name}.png").stat().st_size > 5000 for name in names)
+    figure = maps_figure({"perfect": fold(1.0)}, "A", TINY, 200)
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert titles == ["true B", "perfect: B", "perfect: B - true B"]
+    shown = [axes.images[0].get_array() for axes in figure.axes]
+    assert np.nanmax(np.abs(shown[2])) < 1e-5 * np.nanmax(np.abs(shown[0]))
+    assert skies.folder.is_dir()
+
+
+def test_picture_of_the_sky_is_centred_with_east_to_the_left():
+    """Longitude grows to the left, latitude upwards, around the middle of the survey."""
+    theta, phi = pixel_directions(64)
+    middle = PIXELS // 2
+    east = disc_of_sky(np.angle(np.exp(1j * (phi - np.radians(40)))), "C")
+    assert abs(east[middle, middle]) < np.radians(1)
+    assert east[middle, middle - 50] > 0 > east[middle, middle + 50]
+    north = disc_of_sky(np.pi / 2 - theta, "C")
+    assert north[middle + 50, middle] > north[middle, middle] > north[middle - 50, middle]
+    assert abs(np.degrees(north[middle, middle]) + 45) < 1
+
+
+def test_command_judges_and_keeps(monkeypatch, tmp_path, capsys):
+    names = ["--setting", "tiny", "--surveys", "B", "--methods", "masked", "pseudo:3"]
+    monkeypatch.setattr("sys.argv", ["purity", *names, "--folder", str(tmp_path), "--linearity"])
+    purity_main()
+    found = read_results("tiny", tmp_path)
+    assert [result.method for result in found] == ["masked", "pseudo, N = 3"]
+    assert "s per map, 2 seeds" in capsys.readouterr().out
+    monkeypatch.setattr("sys.argv", ["purity", "--methods", "magic"])
+    with pytest.raises(SystemExit, match="magic"):
+        purity_main()
+
+
+def test_the_page_shows_the_results_that_are_kept():
+    """docs/purity_tables.inc is what `report` makes of the results in the repository."""
+    page = (ROOT / "docs" / "purity_tables.inc").read_text(encoding="utf-8")
+    assert page == all_tables()

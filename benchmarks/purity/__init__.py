@@ -4,6 +4,14 @@
 >>> result = judge("pseudo", "A", "quick")  # doctest: +SKIP
 >>> result.f_ret(1e-4), result.at("r_leak", 1)  # doctest: +SKIP
 
+From the command line, each step by itself::
+
+    python -m benchmarks.purity --setting record --methods masked recycling hybrid --linearity
+    python -m benchmarks.purity --setting record --model shear --surveys D --methods hybrid namaster
+    python -m benchmarks.purity.ratio hybrid wiener --setting record
+    python -m benchmarks.purity.pictures masked hybrid --setting record
+    python -m benchmarks.purity.report
+
 `settings` says at which resolution, `surveys` has the masks, `skies` the simulations, `bands` what
 is compared, `measures` the definitions, `judge` runs them.
 """

@@ -74,12 +74,19 @@ class SeparatorBands:
         )
         return cls(separator, setting)
 
-    def __call__(self, q: Array, u: Array) -> Array:
+    def separate(self, q: Array, u: Array) -> WaveletCoefficients:
+        """Return the coefficients of a separation; what is timed."""
+        return self.separator.separate(q, u).coefficients
+
+    def evaluate(self, coefficients: WaveletCoefficients) -> Array:
         """Return the B of every band, shape (batch, scales, npix)."""
-        coefficients = self.separator.separate(q, u).coefficients
         if self.separator.directions == 1:
             return evaluated_bands(coefficients, self.setting)
         transform = SpinWaveletTransform(
             self.setting.bandlimit, 2, self.separator.directions, lowest_scale=LOWEST_SCALE
         )
         return synthesised_bands(coefficients, transform, self.setting)
+
+    def __call__(self, q: Array, u: Array) -> Array:
+        """Return the B of every band, shape (batch, scales, npix)."""
+        return self.evaluate(self.separate(q, u))

@@ -45,13 +45,22 @@ class NaMasterBands:
 
     def __call__(self, q: Array, u: Array) -> Array:
         """Return the B of every band, shape (batch, scales, npix)."""
-        return np.array([self._bands(*maps) for maps in zip(q, u, strict=True)])
+        return self.evaluate(self.separate(q, u))
 
-    def _bands(self, q: Array, u: Array) -> Array:
+    def separate(self, q: Array, u: Array) -> list[Array]:
+        """Return the purified B of every map; what is timed."""
+        return [self._b_alm(*maps) for maps in zip(q, u, strict=True)]
+
+    def evaluate(self, b_alms: list[Array]) -> Array:
+        """Return the B of every band, shape (batch, scales, npix)."""
+        setting = self.setting
+        return band_maps(np.array([alm_to_flm(alm, setting.bandlimit) for alm in b_alms]), setting)
+
+    def _b_alm(self, q: Array, u: Array) -> Array:
         import pymaster
 
         highest = self.setting.bandlimit - 1
         limits = {"lmax": highest, "lmax_mask": highest}
         maps = [q * self.mask, u * self.mask]
         field = pymaster.NmtField(self.apodised, maps, spin=2, purify_b=True, n_iter=3, **limits)
-        return band_maps(alm_to_flm(field.get_alms()[1], self.setting.bandlimit), self.setting)
+        return field.get_alms()[1]
