@@ -15,7 +15,7 @@ from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.vector_spaces import harmonic_space, wigner_space
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wigner_transform import WignerTransform
-from tests.helpers import EPS, assert_close, random_flm, random_real_flm
+from tests.helpers import EPS, assert_close, needs_compiler, random_flm, random_real_flm
 
 DOORS = ["pixel", "harmonic", "wigner"]
 WAVELETS = [
@@ -146,6 +146,7 @@ def test_vectors_of_real_functions_keep_dot_products(orders):
     assert_close(transform.analysis(functions)[held], found[held], ulps=512)
 
 
+@needs_compiler
 @pytest.mark.parametrize("door", DOORS)
 @pytest.mark.parametrize("transform", WAVELETS)
 def test_least_squares_recover_a_signal_from_its_coefficients(transform, door):
@@ -216,6 +217,7 @@ def test_frame_bounds_are_the_extreme_eigenvalues(transform):
     assert_close(np.vdot(signal, operator @ signal).real, energy, ulps=512)
 
 
+@needs_compiler
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])
 def test_healpix_maps_are_fitted_by_least_squares(spin, real):
     transform = HealpixTransform(8, 12, spin, real=real)

@@ -18,7 +18,14 @@ from spinsdw.sampling import MW, SAMPLINGS
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wavelets import Wavelets
-from tests.helpers import assert_close, direct_map, random_flm, random_real_flm, small_d
+from tests.helpers import (
+    assert_close,
+    direct_map,
+    needs_compiler,
+    random_flm,
+    random_real_flm,
+    small_d,
+)
 
 ROTATIONS = [(0.0, 0.0, 0.0), (0.7, 1.1, -0.4), (-3.0, np.pi, 9.0), (2.0, np.pi / 2, 0.0)]
 each_rotation = pytest.mark.parametrize("rotation", ROTATIONS)
@@ -116,6 +123,7 @@ def test_scalar_wavelets_are_real_in_pixel_space(family):
         np.testing.assert_allclose(wavelet.real, real, rtol=0, atol=1e-14 * size)
 
 
+@needs_compiler
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])
 def test_maps_are_made_on_any_grid(spin, real):
     transform = SpinWaveletTransform(12, spin, 3, real=real)
@@ -131,6 +139,7 @@ def test_maps_are_made_on_any_grid(spin, real):
         assert_close(values, desired if not real else desired.real, ulps=1024)
 
 
+@needs_compiler
 def test_wavelets_lie_where_they_are_put():
     """The centroid of |psi|^2 is in the direction (alpha, beta) of the rotation."""
     grid = MW(64)
@@ -156,6 +165,7 @@ def test_wavelets_lie_where_they_are_put():
         assert centroid @ centre > 0.999 * np.linalg.norm(centroid)
 
 
+@needs_compiler
 def test_curvelets_that_are_not_centred_lie_on_their_circle():
     """At the place that R (-x) gives, a quarter turn from the pole (alpha, beta)."""
     transform = SpinWaveletTransform(64, directionality=CurveletDirectionality())

@@ -12,7 +12,7 @@ from spinsdw.harmonics import degrees, index
 from spinsdw.tiling import CustomTiling, NeedletTiling, ScaleDiscretisedTiling, SplineTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wavelets import Wavelets
-from tests.helpers import EPS, assert_close, random_flm, random_real_flm
+from tests.helpers import EPS, assert_close, needs_compiler, random_flm, random_real_flm
 
 pys2let = pytest.importorskip("pys2let")
 
@@ -135,6 +135,7 @@ def test_splines_agree_up_to_the_numbering(switch, lowest_scale):
     assert_close(kernels(tiling) ** 2, merged**2, ulps=64)
 
 
+@needs_compiler
 @pytest.mark.parametrize(("directions", "lowest_scale"), [(1, 1), (3, 1), (2, 0)])
 @pytest.mark.parametrize(("dilations", "transitions"), [((3.0, 2.0), (10,)), ((4.0, 2.0), (8,))])
 def test_hybrid_and_manual_tilings_of_the_peer_are_custom_tilings(
