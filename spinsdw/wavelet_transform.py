@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
-import warnings
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality, Orientations, SteerableDirectionality
-from spinsdw.errors import ParameterError, PrecisionWarning, ShapeError
+from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
 from spinsdw.memory import MemoryEstimate, check_max_memory
@@ -26,15 +24,10 @@ from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.signals import check_flag, check_map, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
+from spinsdw.wavelet_frame import WaveletFrame
+from spinsdw.wavelet_parameters import resolve_directionality, resolve_tiling, tiling_text
 from spinsdw.wavelets import Wavelets
-from spinsdw.wigner_parts import (
-    check_parts,
-    flm_to_parts,
-    orders_to_samples,
-    part_shapes,
-    parts_to_flm,
-    samples_to_orders,
-)
+from spinsdw.wigner_parts import check_parts, orders_to_samples, part_shapes, samples_to_orders
 
 __all__ = ["SpinWaveletTransform"]
 
@@ -48,66 +41,8 @@ _FREE = {"spin", "real"}
 _MOST_MIXED_ORDERS = 32
 
 
-def _resolve_tiling(
-    tiling: Tiling | None, bandlimit: int, dilation: float | None, lowest_scale: int | None
-) -> Tiling:
-    if tiling is None:
-        return ScaleDiscretisedTiling(
-            bandlimit,
-            dilation=2.0 if dilation is None else dilation,
-            lowest_scale=0 if lowest_scale is None else lowest_scale,
-        )
-    if not isinstance(tiling, Tiling):
-        msg = f"tiling={tiling!r} must be a Tiling, such as ScaleDiscretisedTiling({bandlimit})."
-        raise ParameterError(msg)
-    for name, value in (("dilation", dilation), ("lowest_scale", lowest_scale)):
-        if value is not None:
-            msg = f"{name}={value!r} cannot be given with a tiling, which has its own; drop one."
-            raise ParameterError(msg)
-    if tiling.bandlimit != bandlimit:
-        msg = (
-            f"tiling has bandlimit {tiling.bandlimit} but the transform has {bandlimit}; "
-            "make the tiling with the transform's bandlimit."
-        )
-        raise ParameterError(msg)
-    return tiling
-
-
-def _resolve_directionality(
-    directionality: Directionality | None, directions: int | None
-) -> Directionality:
-    if directionality is None:
-        return SteerableDirectionality(1 if directions is None else directions)
-    if directions is not None:
-        msg = (
-            f"directions={directions!r} cannot be given with a directionality, which has its own; "
-            "drop one."
-        )
-        raise ParameterError(msg)
-    return directionality
-
-
-def _digest(*arrays: Array) -> str:
-    content = b"".join(np.ascontiguousarray(values).tobytes() for values in arrays)
-    return f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
-
-
-def _tiling_text(tiling: Tiling) -> str:
-    """Name a tiling and its parameters in one line of text, an array by a digest of its values."""
-    name = type(tiling).__name__
-    if not is_dataclass(tiling):
-        kernels = (tiling.kernel(j) for j in tiling.scales)
-        return f"{name}({_digest(tiling.scaling_kernel, *kernels)})"
-    values = {item.name: getattr(tiling, item.name) for item in fields(tiling)}
-    texts = (
-        f"{key}={_digest(value) if isinstance(value, np.ndarray) else repr(value)}"
-        for key, value in values.items()
-    )
-    return f"{name}({', '.join(texts)})"
-
-
 @dataclass(frozen=True, eq=False)
-class SpinWaveletTransform:
+class SpinWaveletTransform(WaveletFrame):
     """Decompose spin-s signals into scale-discretised directional wavelets, and back, exactly.
 
     W^j(rho) = <f, R_rho psi^j>: scale j, position (theta, phi) = (beta, alpha), orientation gamma
@@ -200,10 +135,10 @@ class SpinWaveletTransform:
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
         grid = resolve_sampling(sampling, bandlimit)
-        tiling = _resolve_tiling(tiling, bandlimit, dilation, lowest_scale)
+        tiling = resolve_tiling(tiling, bandlimit, dilation, lowest_scale)
         wavelets = Wavelets(
             tiling,
-            _resolve_directionality(directionality, directions),
+            resolve_directionality(directionality, directions),
             spin,
             original_spin=original_spin,
         )
@@ -269,11 +204,6 @@ class SpinWaveletTransform:
         return found
 
     @property
-    def admissibility_error(self) -> float:
-        """Largest deviation from 1 of the sum that makes synthesis exact."""
-        return self.wavelets.admissibility_error
-
-    @property
     def _tiling(self) -> Tiling:
         return self.tiling  # type: ignore[return-value]
 
@@ -295,7 +225,7 @@ class SpinWaveletTransform:
         }
         plain = ScaleDiscretisedTiling
         if type(self._tiling) is not plain or self._tiling.quadrature != "exact":
-            found["tiling"] = _tiling_text(self._tiling)
+            found["tiling"] = tiling_text(self._tiling)
         directionality = self.wavelets.directionality
         if not isinstance(directionality, SteerableDirectionality):
             found["directionality"] = repr(directionality)
@@ -314,11 +244,6 @@ class SpinWaveletTransform:
         return SpinHarmonicTransform(
             grid.bandlimit, 0, sampling=grid, real=self.real, threads=self.threads
         )
-
-    @functools.cached_property
-    def _dual(self) -> Wavelets:
-        """The wavelets of the synthesis."""
-        return self.wavelets.dual
 
     @functools.cached_property
     def _scaling_factors(self) -> tuple[Array, Array]:
@@ -686,80 +611,6 @@ class SpinWaveletTransform:
         flm = writable(check_flm(flm, self.bandlimit))
         return self._decompose(lambda _: flm, adjoint=True)
 
-    def analysis_wigner(self, flm: Array) -> dict[int | str, Array]:
-        """Compute the Wigner coefficients of every scale from harmonic coefficients.
-
-        They are the harmonic form of what `analysis_harmonic` samples (eq-analysis), a product at
-        each degree. Whether the transform is real, or multiresolution, makes no difference.
-
-        Parameters
-        ----------
-        flm : ndarray, shape (..., bandlimit**2), complex
-            As for `analysis_harmonic`.
-
-        Returns
-        -------
-        dict
-            "scaling" -> W^phi_lm, shape (..., L_phi**2), and j -> W^j_lmn, shape (..., orders,
-            L_j**2), complex128, one row for each order n of ``wavelets.orientations_of(j)``. L_j
-            and L_phi are ``tiling.scale_bandlimit(j)`` and ``tiling.scaling_bandlimit``.
-
-        Raises
-        ------
-        ShapeError, DataError
-            As `analysis_harmonic`.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> transform = SpinWaveletTransform(16, spin=2, directions=3)
-        >>> parts = transform.analysis_wigner(np.ones(256))
-        >>> parts[2].shape, parts["scaling"].shape
-        ((3, 64), (1,))
-        >>> bool(np.allclose(transform.synthesis_wigner(parts)[4:], 1, rtol=0, atol=1e-14))
-        True
-        """
-        flm = self._spin_part(check_flm(flm, self.bandlimit))
-        self._warn_of_lost_degrees(flm)
-        return flm_to_parts(self.wavelets, flm, is_analysis=True)
-
-    def synthesis_wigner(self, parts: Mapping[int | str, Array]) -> Array:
-        """Compute harmonic coefficients from the Wigner coefficients of every scale.
-
-        The inverse of `analysis_wigner` (eq-synthesis).
-
-        Parameters
-        ----------
-        parts : mapping
-            As `analysis_wigner` returns them, or changed.
-
-        Returns
-        -------
-        ndarray, shape (..., bandlimit**2), complex128
-            The coefficients, zero for el < abs(spin).
-
-        Raises
-        ------
-        ParameterError
-            If a part is missing or not known.
-        ShapeError
-            If a part has another shape.
-        DataError
-            If a value is not a finite number.
-        """
-        checked = check_parts(self.wavelets, parts)
-        return self._spin_part(parts_to_flm(self._dual, checked, is_analysis=False))
-
-    def adjoint_analysis_wigner(self, parts: Mapping[int | str, Array]) -> Array:
-        """Apply the adjoint of `analysis_wigner`; shapes and errors of `synthesis_wigner`."""
-        checked = check_parts(self.wavelets, parts)
-        return self._spin_part(parts_to_flm(self.wavelets, checked, is_analysis=True))
-
-    def adjoint_synthesis_wigner(self, flm: Array) -> dict[int | str, Array]:
-        """Apply the adjoint of `synthesis_wigner`; shapes and errors of `analysis_wigner`."""
-        flm = self._spin_part(check_flm(flm, self.bandlimit))
-        return flm_to_parts(self._dual, flm, is_analysis=False)
-
     def coefficients_to_wigner(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
         """Transform wavelet coefficients to the Wigner coefficients of every scale, exactly.
 
@@ -893,38 +744,12 @@ class SpinWaveletTransform:
             nside, self.bandlimit, self.spin, real=self.real, threads=self.threads
         )
 
-    def _warn_of_lost_degrees(self, flm: Array) -> None:
-        """Warn of a signal that does not come back from its coefficients."""
-        lost = self.wavelets.lost_degrees
-        if not np.any(lost):
-            return
-        flm = check_flm(flm, self.bandlimit)
-        is_lost = np.repeat(lost, 2 * np.arange(self.bandlimit) + 1)
-        is_lost[: self.spin**2] = False
-        power = np.sum(np.abs(flm[..., is_lost]) ** 2)
-        all_power = np.sum(np.abs(flm[..., self.spin**2 :]) ** 2)
-        if power > (64 * self.bandlimit * np.finfo(float).eps) ** 2 * all_power:
-            msg = (
-                f"{power / all_power:.3g} of the signal's power is in degrees that "
-                f"{self.wavelets.directionality} with spin={self.spin} and "
-                f"original_spin={self.original_spin} do not hold, and will not come back; "
-                "wavelets.lost_degrees tells them."
-            )
-            warnings.warn(msg, PrecisionWarning, stacklevel=3)
-
-    def _spin_part(self, flm: Array) -> Array:
-        """Drop degrees below |s|, which a signal of spin s does not have."""
-        lowest = self.spin**2
-        if lowest == 0:
-            return flm
-        flm = np.array(check_flm(flm, self.bandlimit))
-        flm[..., :lowest] = 0.0
-        return flm
-
     def analysis(self, maps: Array) -> WaveletCoefficients:
         """Compute coefficients from maps, shape (..., rings, phi); see `analysis_harmonic`."""
         self._check_memory("analysis", np.shape(maps)[:-2])
-        return self.analysis_harmonic(self.harmonic.analysis(maps))
+        flm = self.harmonic.analysis(maps)
+        self._warn_of_lost_degrees(flm)
+        return self._decompose(lambda _: flm, adjoint=False)
 
     def synthesis(self, coefficients: WaveletCoefficients) -> Array:
         """Compute maps, shape (..., rings, phi), from wavelet coefficients: inverts `analysis`."""

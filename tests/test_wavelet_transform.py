@@ -273,6 +273,17 @@ def test_ridgelets_give_back_the_degrees_that_they_hold(spin):
     )
 
 
+def test_warnings_point_to_the_call():
+    """Through every door to the line that analysed, where a filter can find it."""
+    transform = SpinWaveletTransform(8, directionality=RidgeletDirectionality())
+    flm = random_flm(8)
+    maps = transform.harmonic.synthesis(flm)
+    for name, signal in (("analysis", maps), ("analysis_harmonic", flm), ("analysis_wigner", flm)):
+        with pytest.warns(PrecisionWarning) as caught:
+            getattr(transform, name)(signal)
+        assert [one.filename for one in caught] == [__file__]
+
+
 def test_degrees_below_the_original_spin_are_lost():
     transform = SpinWaveletTransform(8, 1, 2, original_spin=3)
     flm = random_flm(8, 1)
