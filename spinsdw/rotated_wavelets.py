@@ -2,52 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import numbers
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spinsdw.errors import ParameterError
 from spinsdw.ring_engine import OrderSums, RingEngine
+from spinsdw.rotation import check_rotation
 from spinsdw.wavelets import Wavelets
 
-__all__ = ["check_rotation", "rotated_harmonics"]
-
-
-def check_rotation(rotation: object) -> tuple[float, float, float]:
-    """Return Euler angles alpha, beta, gamma as floats, or say what is wrong with them.
-
-    Parameters
-    ----------
-    rotation : object
-        Three real numbers, in radians.
-
-    Returns
-    -------
-    tuple of float
-
-    Raises
-    ------
-    ParameterError
-        If they are not three finite numbers with beta from 0 to pi.
-
-    Examples
-    --------
-    >>> check_rotation((0, 1, 2))
-    (0.0, 1.0, 2.0)
-    """
-    angles: tuple[Any, ...] = tuple(rotation) if isinstance(rotation, Iterable) else ()
-    are_numbers = len(angles) == 3 and all(isinstance(angle, numbers.Real) for angle in angles)
-    if not are_numbers or not all(map(math.isfinite, angles)) or not 0 <= angles[1] <= math.pi:
-        msg = (
-            f"rotation={rotation!r} must be (alpha, beta, gamma) in radians, with beta, a "
-            "colatitude, from 0 to pi; add pi to alpha and gamma to turn its sign."
-        )
-        raise ParameterError(msg)
-    return float(angles[0]), float(angles[1]), float(angles[2])
+__all__ = ["rotated_harmonics"]
 
 
 def _unrotated(wavelets: Wavelets, scale: int | str) -> tuple[tuple[int, ...], Any]:
@@ -89,7 +53,7 @@ def rotated_harmonics(
     Raises
     ------
     ParameterError
-        If there is no such scale, or ``rotation`` is not three angles with beta from 0 to pi.
+        If there is no such scale, or ``rotation`` is not three finite angles.
 
     Examples
     --------

@@ -197,10 +197,10 @@ def test_synthesis_adds_up_turned_dual_wavelets():
 
 @pytest.mark.parametrize(
     "rotation",
-    [(0, 0), (0, -0.1, 0), (0, 3.2, 0), (0, np.nan, 0), (0, 1, np.inf), "abc", 3, None, (1j, 0, 0)],
+    [(0, 0), (0, np.nan, 0), (0, 1, np.inf), "abc", 3, None, (1j, 0, 0)],
 )
 def test_rotation_is_three_angles(rotation):
-    with pytest.raises(ParameterError, match=r"rotation=.* must be \(alpha, beta, gamma\)"):
+    with pytest.raises(ParameterError, match=r"rotation=.* must be three finite angles"):
         SpinWaveletTransform(8).wavelet_map(2, rotation)
 
 
