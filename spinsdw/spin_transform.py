@@ -275,9 +275,9 @@ class SpinHarmonicTransform:
 
         Returns
         -------
-        ndarray, shape (..., *shape of the points), complex128 (float64 if ``real``)
-            The values, those of spin s in the frame (e_theta, e_phi) of each point; at a pole, of
-            the meridian that its longitude tells.
+        ndarray, shape (..., points), complex128 (float64 if ``real``)
+            The values, with the axes of the points last; those of spin s in the frame (e_theta,
+            e_phi) of each point, at a pole that of the meridian that its longitude tells.
 
         Raises
         ------
@@ -323,8 +323,8 @@ class SpinHarmonicTransform:
 
         Parameters
         ----------
-        values : ndarray, shape (..., *shape of the points)
-            Values at the points.
+        values : ndarray, shape (..., points)
+            Values at the points, whose axes are theirs.
         colatitudes, longitudes, accuracy
             As in `synthesis_at`.
 
