@@ -5,6 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spinsdw.directionality import (
+    CurveletDirectionality,
+    RidgeletDirectionality,
+    SteerableDirectionality,
+)
 from spinsdw.harmonics import eb_to_spin, index, spin_to_eb
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -108,28 +113,37 @@ def mirrored(bandlimit):
     return el, el * el + el - np.arange(bandlimit**2)
 
 
-@pytest.mark.parametrize("directions", [1, 2, 3, 4])
-def test_wavelet_coefficients_are_convolutions(directions):
+@pytest.mark.parametrize(
+    ("bandlimit", "directionality"),
+    [
+        *((32, SteerableDirectionality(directions)) for directions in (1, 2, 3, 4)),
+        (20, CurveletDirectionality()),
+        (20, CurveletDirectionality(centred=True)),
+        (32, RidgeletDirectionality()),
+    ],
+    ids=str,
+)
+def test_wavelet_coefficients_are_convolutions(bandlimit, directionality):
     """Of a real sky with a beam psi, pointed at (beta, alpha) and turned by gamma."""
-    bandlimit = 32
-    transform = SpinWaveletTransform(bandlimit, 0, directions, real=True)
+    transform = SpinWaveletTransform(bandlimit, real=True, directionality=directionality)
     sky = random_real_flm(bandlimit)
+    sky[np.repeat(transform.wavelets.lost_degrees, 2 * np.arange(bandlimit) + 1)] = 0
     coefficients = transform.analysis_harmonic(sky)
-    orders = transform.wavelets.directionality.orders
     for scale in (3, 5):
         rows = transform.wavelets.wavelet_harmonics(scale)
+        orientations = transform.wavelets.orientations_of(scale)
         beam = np.zeros(bandlimit**2, dtype=complex)
-        for n, row in zip(orders, rows, strict=True):
+        for n, row in zip(orientations.orders, rows, strict=True):
             el = np.arange(abs(n), row.size)
             beam[index(el, n)] = row[el]
         grid = transform.grid_of(transform.bandlimits[scale])
-        alpha, beta, gamma = euler_grid(grid, transform.orientations)
+        alpha, beta, gamma = euler_grid(grid, orientations.angles)
         convolver = ducc0.totalconvolve.Interpolator(
             to_peer(sky, bandlimit)[None],
-            to_peer(beam, bandlimit, directions)[None],
+            to_peer(beam, bandlimit, orientations.largest_order + 1)[None],
             False,
             lmax=bandlimit - 1,
-            kmax=directions - 1,
+            kmax=orientations.largest_order,
             npoints=alpha.size,
             epsilon=1e-12,
             nthreads=1,
