@@ -152,7 +152,7 @@ class EBSeparator:
     ----------
     bandlimit : int or None, optional
         L: degrees are l < L. None takes it from the mask: 2 nside + 1 on HEALPix, the grid's own
-        on MW and MWSS.
+        on MW and MWSS. Maps on those may be finer than L needs.
     mask : ndarray, or sequence of ndarray, optional
         1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). Several masks are
         multiplied. None: full sky.
@@ -291,8 +291,8 @@ class EBSeparator:
         ----------
         q, u : ndarray, real, shape (..., *map)
             Stokes parameters, COSMO frame, any unit: HEALPix maps (12 nside^2,), MW maps
-            (L, 2 L - 1) or MWSS maps (L + 1, 2 L), pixelised as the mask is; leading axes are a
-            batch. Pixels where the mask is 0 may hold anything.
+            (G, 2 G - 1) or MWSS maps (G + 1, 2 G) with G >= L, pixelised as the mask is; leading
+            axes are a batch. Pixels where the mask is 0 may hold anything.
 
         Returns
         -------
@@ -306,7 +306,7 @@ class EBSeparator:
         DataError
             If an observed pixel is NaN, infinite or UNSEEN, or Q or U is complex.
         ParameterError
-            If the shape does not fit the bandlimit.
+            If the maps are too coarse for the bandlimit.
         """
         clock = Clock()
         refuse_masked(q, "q")

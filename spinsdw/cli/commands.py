@@ -19,7 +19,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 ORDERINGS, POLCONVS = ("RING", "NESTED"), ("COSMO", "IAU")
 # The choices of EBSeparator, which is too heavy to be asked for --help; a test holds them equal.
-METHODS = ("pseudo",)
+METHODS = ("masked", "pseudo", "pure", "harmonic-pure", "recycling", "needlets")
 OUTPUTS = ("fields", "derivatives", "potentials")
 SYNCHROTRON = "WMAP nine-year synchrotron at 23 GHz: a Galactic foreground, not the CMB."
 

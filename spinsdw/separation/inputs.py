@@ -92,7 +92,8 @@ def _map_axes(values: Array, shape: tuple[int, ...] | None, bandlimit: int | Non
         rings, phis = values.shape[-2:]
         for sampling, limit in ((MW, rings), (MWSS, rings - 1)):
             fits = limit >= 1 and sampling(limit).shape == (rings, phis)
-            if fits and bandlimit in {None, limit}:
+            is_finer = bandlimit is not None and bandlimit < limit and not _is_healpix(phis)
+            if fits and (bandlimit in {None, limit} or is_finer):
                 return 2
     # A stack of HEALPix maps, or a shape that no sky has: told by the check of the sky.
     return 1 if values.ndim >= 2 and _is_healpix(values.shape[-1]) else min(values.ndim, 2)

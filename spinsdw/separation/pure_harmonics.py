@@ -43,11 +43,20 @@ def pure_harmonics(
     ------
     ShapeError, DataError
         If maps have another shape than the sky's, or are not finite.
+
+    Notes
+    -----
+    Exact to rounding on a grid that holds the product, of bandlimit L + L_M - 1 for a map of
+    bandlimit L. Maps sampled at their own bandlimit are brought to such a grid: exactly where they
+    are known everywhere; where they end at the edge of a footprint they are not band-limited.
     """
     bandlimit = sky.bandlimit if bandlimit is None else bandlimit
     el = np.arange(bandlimit, dtype=np.float64)
     factor = polarisation_factor(bandlimit)
     inverse = np.divide(1.0, factor, out=np.zeros(bandlimit), where=factor > 0)
+    if isinstance(sky, GridSky):
+        fine = sky.for_products(mask.bandlimit)
+        p, mask, sky = sky.evaluate(p, fine), mask.on(fine), fine
     plm = sky.weighted_coefficients(mask.values * p, bandlimit, 2)
     one = sky.weighted_coefficients(mask.first * p, bandlimit, 1)
     plm += multiply_by_degree(one, 2 * np.sqrt(el * (el + 1)) * inverse)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +24,7 @@ from spinsdw.sampling import MW, MWSS, Sampling
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
-__all__ = ["GridSky", "HealpixSky", "Sky", "position_map", "sky_of"]
+__all__ = ["GridSky", "HealpixSky", "Sky", "finer_grid", "position_map", "sky_of"]
 
 Array = np.ndarray[Any, Any]
 
@@ -54,6 +54,11 @@ class Sky(Protocol):
     @property
     def points(self) -> tuple[Array, Array]:
         """Colatitudes and longitudes of the points in radians, of the shape of a map."""
+        ...
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring samples in radians."""
         ...
 
     def scalar_map(self, flm: Array) -> Array:
@@ -113,6 +118,11 @@ class HealpixSky:
         """Colatitudes and longitudes of the points in radians, of the shape of a map."""
         return pixel_directions(self.nside)
 
+    @property
+    def spacing(self) -> float:
+        """Mean distance between neighbouring samples in radians."""
+        return float(np.sqrt(np.pi / 3)) / self.nside
+
     def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
         """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
         return map_to_flm(p, self.bandlimit, 2, tolerance=self.tolerance, threads=self.threads)
@@ -160,15 +170,26 @@ class HealpixSky:
 
 @dataclass(frozen=True)
 class GridSky:
-    """Maps on an MW or MWSS grid."""
+    """Maps on an MW or MWSS grid, which may be finer than their bandlimit needs.
+
+    Parameters
+    ----------
+    sampling : Sampling
+        The grid.
+    threads : int, optional
+        Threads of the transforms.
+    limit : int, optional
+        Degrees used are below it; the grid's own bandlimit when None.
+    """
 
     sampling: Sampling
     threads: int | None = None
+    limit: int | None = None
 
     @property
     def bandlimit(self) -> int:
         """Degrees used are below it."""
-        return self.sampling.bandlimit
+        return self.sampling.bandlimit if self.limit is None else self.limit
 
     @property
     def sampling_name(self) -> str:
@@ -187,18 +208,30 @@ class GridSky:
         colatitudes, longitudes = np.meshgrid(grid.colatitudes, grid.longitudes, indexing="ij")
         return colatitudes, longitudes
 
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring rings in radians."""
+        return 2 * np.pi / self.sampling.n_phi
+
     def _transform(self, spin: int, *, real: bool = False) -> SpinHarmonicTransform:
+        grid = self.sampling
         return SpinHarmonicTransform(
-            self.bandlimit, spin, sampling=self.sampling, real=real, threads=self.threads
+            grid.bandlimit, spin, sampling=grid, real=real, threads=self.threads
         )
 
     def polarisation_coefficients(self, p: Array) -> tuple[Array, HealpixFit | None]:
         """Return the spin-2 coefficients of P = Q + iU, and how well they fit."""
-        return self._transform(2).analysis(p), None
+        return self._cut(self._transform(2).analysis(p)), None
+
+    def _cut(self, flm: Array) -> Array:
+        return flm if self.limit is None else resize(flm, self.limit)
+
+    def _fill(self, flm: Array) -> Array:
+        return flm if self.limit is None else resize(flm, self.sampling.bandlimit)
 
     def scalar_map(self, flm: Array) -> Array:
         """Return the complex map of spin-0 coefficients of any bandlimit."""
-        return self._transform(0).synthesis(resize(flm, self.bandlimit))
+        return self._transform(0).synthesis(resize(flm, self.sampling.bandlimit))
 
     def integrals(self, weights: Array, bandlimit: int) -> Array:
         """Return <Ylm, weights> for l < bandlimit: coefficients of a real field."""
@@ -207,11 +240,11 @@ class GridSky:
 
     def polarisation_map(self, plm: Array) -> Array:
         """Return P = Q + iU of spin-2 coefficients."""
-        return self._transform(2).synthesis(plm)
+        return self._transform(2).synthesis(self._fill(plm))
 
     def adjoint_polarisation_map(self, p: Array) -> Array:
         """Apply the adjoint of `polarisation_map`: sums over samples."""
-        return self._transform(2).adjoint_synthesis(p)
+        return self._cut(self._transform(2).adjoint_synthesis(p))
 
     def coordinates(self, p: Array) -> Array:
         """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
@@ -234,6 +267,37 @@ class GridSky:
     def weighted_coefficients(self, maps: Array, bandlimit: int, spin: int) -> Array:
         """Return <sYlm, maps> of complex maps of any spin that need not be band-limited."""
         return resize(self._transform(spin).analysis(maps), bandlimit)
+
+    def for_products(self, bandlimit: int) -> GridSky:
+        """Return the sky on which products with fields of a bandlimit are integrated.
+
+        A map sampled at its own bandlimit goes to a finer grid, which holds the product; one on a
+        finer grid stays, for it may end at the edge of a footprint, where it is not band-limited.
+        """
+        if self.limit is not None:
+            return self
+        grid, _ = finer_grid(self.sampling, self.bandlimit + bandlimit - 1)
+        return replace(self, sampling=grid, limit=self.bandlimit)
+
+    def evaluate(self, p: Array, sky: GridSky) -> Array:
+        """Return P on another grid: the band-limited function that its samples define."""
+        if sky.sampling == self.sampling:
+            return p
+        plm = self._transform(2).analysis(p)
+        return sky._transform(2).synthesis(resize(plm, sky.sampling.bandlimit))
+
+
+def finer_grid(grid: Sampling, bandlimit: int) -> tuple[Sampling, tuple[slice, slice]]:
+    """Return a grid of at least a bandlimit that holds the samples of another one, and where."""
+    times = -(-bandlimit // grid.bandlimit)
+    if isinstance(grid, MW):
+        # theta = (2 t + 1) pi / (2 L - 1): the odd multiples of 2 L - 1 are the finer grids.
+        times = (
+            1 if times == 1 else -(-(2 * bandlimit - 1) // (2 * grid.bandlimit - 1)) // 2 * 2 + 1
+        )
+        finer: Sampling = MW((times * (2 * grid.bandlimit - 1) + 1) // 2)
+        return finer, (slice(times // 2, None, times), slice(None, None, times))
+    return MWSS(times * grid.bandlimit), (slice(None, None, times), slice(None, None, times))
 
 
 def position_map(
@@ -285,7 +349,7 @@ def sky_of(
     ShapeError
         If the shape is none of theirs.
     ParameterError
-        If the shape does not fit the bandlimit.
+        If the grid is too coarse for the bandlimit.
     """
     if values.ndim == 1:
         nside = nside_of(values)
@@ -293,15 +357,16 @@ def sky_of(
         return HealpixSky(nside, limit, threads)
     if values.ndim == 2:
         rings, phis = values.shape
-        for sampling, limit in ((MW, rings), (MWSS, rings - 1)):
-            if limit >= 1 and sampling(limit).shape == (rings, phis):
-                if bandlimit not in {None, limit}:
+        for sampling, size in ((MW, rings), (MWSS, rings - 1)):
+            if size >= 1 and sampling(size).shape == (rings, phis):
+                grid_limit = None if bandlimit in {None, size} else check_bandlimit(bandlimit)
+                if grid_limit is not None and grid_limit > size:
                     msg = (
-                        f"{name} has the shape {values.shape} of bandlimit {limit}, not of "
-                        f"bandlimit={bandlimit}; make both agree."
+                        f"{name} has the shape {values.shape} of bandlimit {size}, below "
+                        f"bandlimit={bandlimit}; lower it or give maps on a finer grid."
                     )
                     raise ParameterError(msg)
-                return GridSky(sampling(limit), threads)
+                return GridSky(sampling(size), threads, grid_limit)
     msg = (
         f"{name} has shape {values.shape}; it must be a HEALPix map (12 nside^2,), an MW map "
         "(L, 2 L - 1) or an MWSS map (L + 1, 2 L)."

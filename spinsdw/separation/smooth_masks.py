@@ -24,48 +24,99 @@ from numpy.typing import NDArray
 
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import multiply_by_degree, raise_spin
-from spinsdw.healpix import flm_to_map
+from spinsdw.healpix import flm_to_map, map_to_flm
+from spinsdw.masks import apodise
 from spinsdw.parallel import resolve_threads
-from spinsdw.sampling import MW, MWSS, Sampling
-from spinsdw.separation.skies import GridSky, HealpixSky
+from spinsdw.sampling import GaussLegendre, Sampling
+from spinsdw.separation.skies import GridSky, HealpixSky, finer_grid
 from spinsdw.spin_transform import SpinHarmonicTransform
 
-__all__ = ["SmoothMask", "SmoothMasks", "concentrated_kernel"]
+__all__ = ["SmoothMask", "SmoothMasks", "concentrated_kernel", "profile_mask"]
 
 Array = NDArray[Any]
 AnySky = HealpixSky | GridSky
 
-# L_M times the kernel's radius: what is outside its cap falls as exp(-that).  On HEALPix products
-# with a mask of higher degrees are integrated worse than such a share disturbs.
-_CONCENTRATION = {HealpixSky: 18.0, GridSky: 36.0}
+# L_M times the kernel's radius: what is outside its cap falls as exp(-that). Where sums over
+# samples are not exact, products with a mask of higher degrees lose more than that disturbs.
+_CONCENTRATION, _EXACT_CONCENTRATION = 18.0, 36.0
 # Largest L_M, in units of nside or of the grid's bandlimit.
 _LARGEST_BANDLIMIT = 4
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothMask:
-    r"""A smooth mask at the points of a sky.
+    """A smooth mask of a sky.
 
-    Attributes
+    Parameters
     ----------
     width : float
         Width of its taper in radians.
-    values : ndarray, shape of a map, float64
-        M: 0 where not observed, 1 farther than the width inside.
-    first, second : ndarray, shape of a map, complex128
-        The spin derivatives eth-bar M and eth-bar^2 M, of spin -1 and -2.
-    bandlimit : int
-        L_M: the degrees of M are below it.
-    ringing : float
-        Largest \|M\| where nothing was observed, which ought to be 0.
+    sky : HealpixSky or GridSky
+        The pixelisation.
+    harmonics : ndarray, shape (L_M**2,), complex128
+        Coefficients of M, or where M is given those that its derivatives are made of.
+    observed : ndarray, shape of a map, bool, optional
+        What is not observed has M = 0 without the ringing of the band-limited M.
+    given : ndarray, shape of a map, float64, optional
+        M itself, where it is not band-limited.
     """
 
     width: float
-    values: Array = field(repr=False)
-    first: Array = field(repr=False)
-    second: Array = field(repr=False)
-    bandlimit: int
-    ringing: float
+    sky: AnySky
+    harmonics: Array = field(repr=False)
+    observed: Array | None = field(default=None, repr=False)
+    given: Array | None = field(default=None, repr=False)
+    _elsewhere: dict[AnySky, SmoothMask] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def bandlimit(self) -> int:
+        """L_M: the degrees of M are below it."""
+        return math.isqrt(self.harmonics.size)
+
+    @functools.cached_property
+    def values(self) -> Array:
+        """M: 0 where not observed, 1 farther than the width inside; shape of a map, float64."""
+        return self._masked(self._band_limited if self.given is None else self.given)
+
+    @functools.cached_property
+    def first(self) -> Array:
+        """eth-bar M, of spin -1; shape of a map, complex128."""
+        one = raise_spin(self.harmonics, 0)
+        return self._masked(_at_points(self.sky, one, 1).conj())
+
+    @functools.cached_property
+    def second(self) -> Array:
+        """eth-bar^2 M, of spin -2; shape of a map, complex128."""
+        two = raise_spin(raise_spin(self.harmonics, 0), 1)
+        return self._masked(_at_points(self.sky, two, 2).conj())
+
+    @functools.cached_property
+    def _band_limited(self) -> Array:
+        return _at_points(self.sky, self.harmonics, 0).real
+
+    def _masked(self, values: Array) -> Array:
+        masked = values.copy() if self.observed is None else values * self.observed
+        masked.setflags(write=False)
+        return masked
+
+    @property
+    def ringing(self) -> float:
+        """Largest band-limited M where nothing was observed, which ought to be 0."""
+        if self.observed is None:
+            return 0.0
+        return float(np.max(np.abs(self._band_limited[~self.observed]), initial=0.0))
+
+    def on(self, sky: AnySky) -> SmoothMask:
+        """Return the same mask at the samples of another sky, where all of it is observed."""
+        if sky == self.sky:
+            return self
+        if sky not in self._elsewhere:
+            self._elsewhere[sky] = SmoothMask(self.width, sky, self.harmonics)
+        return self._elsewhere[sky]
+
+    def weights(self, grid: Sampling) -> Array:
+        """Return M at the samples of a grid, clipped to [0, 1]; float64, shape (rings, phi)."""
+        return np.clip(_at_points(GridSky(grid), self.harmonics, 0).real, 0.0, 1.0)
 
 
 def concentrated_kernel(bandlimit: int, radius: float) -> Array:
@@ -193,37 +244,40 @@ class SmoothMasks:
 
     def _make(self, width: float) -> SmoothMask:
         if np.all(self.mask == 1):
-            values, zeros = np.ones(self.mask.shape), np.zeros(self.mask.shape, np.complex128)
-            return SmoothMask(width, values, zeros, zeros, 1, 0.0)
-        wanted = math.ceil((2 * _CONCENTRATION[type(self.sky)] + math.pi) / width)
-        bandlimit = max(3, min(wanted, _LARGEST_BANDLIMIT * _resolution(self.sky)))
+            # Bandlimit 3, the least that holds fields of spin 2.
+            flm = np.zeros(9, dtype=np.complex128)
+            flm[0] = math.sqrt(4 * math.pi)
+            return SmoothMask(width, self.sky, flm)
+        bandlimit = self._bandlimit(width)
         radius = (width - math.pi / bandlimit) / 2
         flm = self._inner_harmonics(bandlimit, width)
         flm = multiply_by_degree(flm, concentrated_kernel(bandlimit, radius))
-        values = _at_points(self.sky, flm, 0).real.copy()
-        one = raise_spin(flm, 0)
-        first = _at_points(self.sky, one, 1).conj()
-        second = _at_points(self.sky, raise_spin(one, 1), 2).conj()
-        hidden = self.mask == 0
-        ringing = float(np.max(np.abs(values[hidden]), initial=0.0))
-        for array in (values, first, second):
-            array[hidden] = 0.0
-            array.setflags(write=False)
-        return SmoothMask(width, values, first, second, bandlimit, ringing)
+        return SmoothMask(width, self.sky, flm, self.mask > 0)
+
+    def _bandlimit(self, width: float) -> int:
+        sky = self.sky
+        exact, usual = (
+            math.ceil((2 * concentration + math.pi) / width)
+            for concentration in (_EXACT_CONCENTRATION, _CONCENTRATION)
+        )
+        if isinstance(sky, HealpixSky):
+            return max(3, min(usual, _LARGEST_BANDLIMIT * sky.nside))
+        size = sky.sampling.bandlimit
+        is_exact = sky.bandlimit + exact - 1 <= size
+        return max(3, exact if is_exact else min(usual, _LARGEST_BANDLIMIT * size))
 
     def _inner_harmonics(self, bandlimit: int, width: float) -> Array:
         """Return the coefficients of the mask where it is farther than width / 2 from its edge."""
-        # A quadrature that is exact below the bandlimit: the kernel's values add up to 1.
-        grid = MWSS(bandlimit)
-        weights = _clenshaw_curtis(bandlimit) * (np.pi / bandlimit)
+        # Gauss-Legendre weights are positive and exact: the kernel's values add up to 1.
+        grid = GaussLegendre(bandlimit)
         values = np.empty(grid.shape)
         for ring, colatitude in enumerate(grid.colatitudes):
             angles = np.full(grid.n_phi, colatitude), grid.longitudes
-            values[ring] = weights[ring] * self._inside(angles, width, np.pi / bandlimit)
+            values[ring] = self._inside(angles, width, np.pi / bandlimit)
         transform = SpinHarmonicTransform(
             bandlimit, sampling=grid, real=True, threads=self.sky.threads
         )
-        return transform.adjoint_synthesis(values)
+        return transform.analysis(values)
 
     def _inside(self, angles: tuple[Array, Array], width: float, step: float) -> Array:
         """Return the mask at points farther than width / 2 from its edge, rising in one step.
@@ -241,16 +295,43 @@ class SmoothMasks:
         return np.clip(depth / step + 0.5, 0.0, 1.0) * self.sky.nearest(self.mask, angles)
 
 
+def profile_mask(sky: HealpixSky, mask: Array, width: float, profile: str) -> SmoothMask:
+    """Taper a HEALPix mask pixel by pixel and differentiate it in harmonic space.
+
+    What harmonic pure estimators in use do: such a mask has no bandlimit, so its derivatives are
+    only about those of its values.
+
+    Parameters
+    ----------
+    sky : HealpixSky
+        The pixelisation.
+    mask : ndarray, shape (npix,), float64
+        In [0, 1], ring order.
+    width : float
+        Width of the taper in radians.
+    profile : str
+        A profile of `spinsdw.masks.apodise`.
+
+    Returns
+    -------
+    SmoothMask
+        M is the tapered mask itself; its derivatives are those of its fit up to degree 2.5 nside.
+
+    Raises
+    ------
+    ParameterError
+        As `apodise` does.
+    """
+    tapered = apodise(mask, width, profile=profile)
+    flm, _ = map_to_flm(tapered, int(2.5 * sky.nside), threads=sky.threads)
+    return SmoothMask(width, sky, flm, tapered > 0, tapered)
+
+
 def _vectors(colatitudes: Array, longitudes: Array) -> Array:
     """Return unit vectors, shape (points, 3)."""
     sines = np.sin(colatitudes)
     parts = (sines * np.cos(longitudes), sines * np.sin(longitudes), np.cos(colatitudes))
     return np.stack(parts, axis=-1)
-
-
-def _resolution(sky: AnySky) -> int:
-    """Return nside or the bandlimit of the grid."""
-    return sky.nside if isinstance(sky, HealpixSky) else sky.sampling.bandlimit
 
 
 def _sample_radius(sky: AnySky) -> float:
@@ -261,36 +342,13 @@ def _sample_radius(sky: AnySky) -> float:
     return math.pi / sky.sampling.bandlimit
 
 
-def _clenshaw_curtis(intervals: int) -> Array:
-    """Return the weights of cos(pi t / n), t = 0..n, for integrals over [-1, 1]."""
-    k = np.arange(intervals + 1)
-    moments = np.where(k % 2 == 0, 2.0 / (1.0 - k.astype(np.float64) ** 2 + (k == 1)), 0.0)
-    ends = np.where((k == 0) | (k == intervals), 0.5, 1.0)
-    circle = np.concatenate([moments, moments[intervals - 1 : 0 : -1]])
-    weights: Array = np.fft.ifft(circle).real[: intervals + 1] * 2 * ends
-    return weights
-
-
 def _at_points(sky: AnySky, flm: Array, spin: int) -> Array:
     """Evaluate coefficients of any bandlimit at the samples of a sky, complex128."""
     if isinstance(sky, HealpixSky):
         return flm_to_map(flm, sky.nside, spin, threads=sky.threads)
     bandlimit = math.isqrt(flm.shape[-1])
-    grid, part = _finer_grid(sky.sampling, bandlimit)
+    grid, part = finer_grid(sky.sampling, bandlimit)
     transform = SpinHarmonicTransform(grid.bandlimit, spin, sampling=grid, threads=sky.threads)
     padded = np.zeros(grid.bandlimit**2, dtype=np.complex128)
     padded[: flm.size] = flm
     return transform.synthesis(padded)[part].copy()
-
-
-def _finer_grid(grid: Sampling, bandlimit: int) -> tuple[Sampling, tuple[slice, slice]]:
-    """Return a grid of at least a bandlimit that holds the samples of another one, and where."""
-    times = -(-bandlimit // grid.bandlimit)
-    if isinstance(grid, MW):
-        # theta = (2 t + 1) pi / (2 L - 1): the odd multiples of 2 L - 1 are the finer grids.
-        times = (
-            1 if times == 1 else -(-(2 * bandlimit - 1) // (2 * grid.bandlimit - 1)) // 2 * 2 + 1
-        )
-        finer: Sampling = MW((times * (2 * grid.bandlimit - 1) + 1) // 2)
-        return finer, (slice(times // 2, None, times), slice(None, None, times))
-    return MWSS(times * grid.bandlimit), (slice(None, None, times), slice(None, None, times))

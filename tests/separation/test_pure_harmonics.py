@@ -40,11 +40,11 @@ def polarisation(sky, e_lm, b_lm):
 @pytest.mark.parametrize("sampling", [MW, MWSS])
 def test_pure_coefficients_are_the_mask_times_the_derivatives(sampling):
     """N_l p_lm = -(M (E~ + i B~))_lm, to rounding where the grid holds the product"""
-    sky = GridSky(sampling(L))
+    sky = GridSky(sampling(L), None, SIGNAL)
     smooth = SmoothMasks(sky, footprint(sky)).of_width(0.58)
     assert smooth.bandlimit + SIGNAL <= L
     e_lm, b_lm = random_eb()
-    found = pure_harmonics(sky, smooth, polarisation(sky, e_lm, b_lm))
+    found = pure_harmonics(sky, smooth, polarisation(sky, e_lm, b_lm), L)
     scalar = SpinHarmonicTransform(L, sampling=sky.sampling)
     derivatives = multiply_by_degree(e_lm + 1j * b_lm, polarisation_factor(SIGNAL))
     expected = -scalar.analysis(smooth.values * scalar.synthesis(resize(derivatives, L)))
@@ -57,7 +57,11 @@ def test_pure_coefficients_are_the_mask_times_the_derivatives(sampling):
 @needs_compiler
 @pytest.mark.parametrize(
     ("sky", "tolerance"),
-    [(GridSky(MW(L)), 1e-12), (GridSky(MWSS(L)), 1e-12), (HealpixSky(64, 65), 1e-6)],
+    [
+        (GridSky(MW(L), None, SIGNAL), 1e-12),
+        (GridSky(MWSS(L), None, SIGNAL), 1e-12),
+        (HealpixSky(64, 65), 1e-6),
+    ],
     ids=["mw", "mwss", "healpix"],
 )
 def test_e_does_not_leak_into_b(sky, tolerance):
@@ -70,6 +74,20 @@ def test_e_does_not_leak_into_b(sky, tolerance):
     assert np.abs(b[0]).max() < tolerance * np.abs(e[0]).max()
     assert np.abs(e[1]).max() < tolerance * np.abs(b[1]).max()
     assert np.abs(e[0]).max() > 0.1
+
+
+@needs_compiler
+@pytest.mark.parametrize("sampling", [MW, MWSS])
+def test_a_map_sampled_at_its_own_bandlimit_goes_to_a_finer_grid(sampling):
+    """The same to rounding as from a grid that holds the product, for a map known everywhere"""
+    coarse, fine = GridSky(sampling(SIGNAL)), GridSky(sampling(L), None, SIGNAL)
+    smooth = SmoothMasks(coarse, cap(coarse, 2.0)).of_width(1.2)
+    plm = eb_to_spin(*random_eb())
+    p = SpinHarmonicTransform(SIGNAL, 2, sampling=coarse.sampling).synthesis(plm)
+    found = pure_harmonics(coarse, smooth, p)
+    expected = pure_harmonics(fine, smooth.on(fine), fine.polarisation_map(plm))
+    assert smooth.bandlimit + SIGNAL <= L
+    assert_close(found, expected, ulps=64 * L)
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,21 @@ from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.harmonics import is_real_field, resize
 from spinsdw.healpix import flm_to_map
 from spinsdw.sampling import MW, MWSS
-from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
+from spinsdw.separation.skies import GridSky, HealpixSky, finer_grid, position_map, sky_of
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import assert_close, random_flm
+from tests.helpers import EPS, assert_close, random_flm, random_like
 
 NSIDE, L = 8, 16
-SKIES = [GridSky(MW(L)), GridSky(MWSS(L)), HealpixSky(NSIDE, L)]
-each_sky = pytest.mark.parametrize("sky", SKIES, ids=["mw", "mwss", "healpix"])
+SKIES = [
+    GridSky(MW(L)),
+    GridSky(MWSS(L)),
+    HealpixSky(NSIDE, L),
+    GridSky(MW(20), None, L),
+    GridSky(MWSS(20), None, L),
+]
+names = ["mw", "mwss", "healpix", "finer mw", "finer mwss"]
+each_sky = pytest.mark.parametrize("sky", SKIES, ids=names)
 
 
 def real_flm(bandlimit, seed=0):
@@ -33,6 +40,8 @@ def real_flm(bandlimit, seed=0):
         ((16, 31), None, GridSky(MW(16))),
         ((16, 31), 16, GridSky(MW(16))),
         ((17, 32), 16, GridSky(MWSS(16))),
+        ((16, 31), 12, GridSky(MW(16), None, 12)),
+        ((17, 32), 12, GridSky(MWSS(16), None, 12)),
         ((1, 1), None, GridSky(MW(1))),
         ((2, 2), None, GridSky(MWSS(1))),
     ],
@@ -56,11 +65,11 @@ def test_wrong_number_of_pixels_is_refused():
         sky_of(np.zeros(767), None, name="q", threads=None)
 
 
-@pytest.mark.parametrize(("shape", "limit"), [((16, 31), 16), ((17, 32), 16)])
-def test_bandlimit_of_another_grid_is_refused(shape, limit):
-    message = rf"mask has the shape \(.*\) of bandlimit {limit}, not of bandlimit=12; make both"
+@pytest.mark.parametrize("shape", [(16, 31), (17, 32)])
+def test_grids_too_coarse_for_the_bandlimit_are_refused(shape):
+    message = r"mask has the shape \(.*\) of bandlimit 16, below bandlimit=18; lower it"
     with pytest.raises(ParameterError, match=message):
-        sky_of(np.zeros(shape), 12, name="mask", threads=None)
+        sky_of(np.zeros(shape), 18, name="mask", threads=None)
 
 
 @each_sky
@@ -70,7 +79,8 @@ def test_scalar_map_is_the_synthesis_at_the_points_of_the_sky(sky):
     if isinstance(sky, HealpixSky):
         expected = flm_to_map(resize(flm, L), NSIDE)
     else:
-        expected = SpinHarmonicTransform(L, sampling=sky.sampling).synthesis(resize(flm, L))
+        size = sky.sampling.bandlimit
+        expected = SpinHarmonicTransform(size, sampling=sky.sampling).synthesis(resize(flm, size))
     assert_close(sky.scalar_map(flm), expected, ulps=16 * L)
 
 
@@ -83,7 +93,9 @@ def test_polarisation_coefficients_are_those_of_the_map(sky):
         assert fit.residual < sky.tolerance
         assert np.max(np.abs(found - plm)) < 10 * sky.tolerance * np.max(np.abs(plm))
     else:
-        p = SpinHarmonicTransform(L, 2, sampling=sky.sampling).synthesis(plm)
+        size = sky.sampling.bandlimit
+        transform = SpinHarmonicTransform(size, 2, sampling=sky.sampling)
+        p = transform.synthesis(resize(plm, size))
         found, fit = sky.polarisation_coefficients(p)
         assert fit is None
         assert_close(found, plm, ulps=16 * L)
@@ -144,3 +156,40 @@ def test_position_map_keeps_a_band_limited_weight(sampling):
     assert values.max() < 1
     scale = transform.scales[-1]
     assert_close(position_map(values, transform, scale, GridSky(sampling(L))), values, ulps=16 * L)
+
+
+@pytest.mark.parametrize("sky", [sky for sky in SKIES if isinstance(sky, GridSky)])
+def test_maps_and_their_adjoint_keep_to_the_bandlimit(sky):
+    """<Y a, p> = <a, Y^H p> for coefficients of the sky's bandlimit, whatever that of its grid"""
+    plm, p = random_flm(L, 2, seed=3), random_like(np.zeros(sky.map_shape, complex), seed=4)
+    left = np.vdot(p, sky.polarisation_map(plm))
+    assert sky.adjoint_polarisation_map(p).shape == plm.shape
+    right = np.vdot(sky.adjoint_polarisation_map(p), plm)
+    assert abs(left - right) < 64 * L * EPS * np.linalg.norm(p) * np.linalg.norm(plm)
+
+
+@pytest.mark.parametrize("sampling", [MW, MWSS])
+@pytest.mark.parametrize(("bandlimit", "least"), [(5, 5), (5, 6), (8, 40), (1, 7), (7, 3)])
+def test_finer_grid_holds_the_samples(sampling, bandlimit, least):
+    coarse = sampling(bandlimit)
+    fine, (rings, places) = finer_grid(coarse, least)
+    assert fine.bandlimit >= max(least, bandlimit)
+    assert_close(fine.colatitudes[rings], coarse.colatitudes, ulps=8)
+    assert_close(fine.longitudes[places], coarse.longitudes, ulps=8)
+
+
+@each_sky
+def test_nearest_sample_is_the_nearest(sky):
+    """The map of the samples' own numbers, looked up near them, gives the numbers"""
+    rng = np.random.default_rng(1)
+    numbers = np.arange(np.prod(sky.map_shape)).reshape(sky.map_shape)
+    theta, phi = (angle.copy() for angle in sky.points)
+    theta = np.clip(theta + rng.uniform(-0.01, 0.01, theta.shape), 0, np.pi)
+    found = sky.nearest(numbers, (theta, phi))
+    assert np.array_equal(found, numbers)
+
+
+@each_sky
+def test_spacing_is_that_of_neighbours(sky):
+    theta = np.unique(sky.points[0])
+    assert 0.5 < sky.spacing / np.median(np.diff(theta)) < 2

@@ -15,19 +15,13 @@ from spinsdw.spin_transform import SpinHarmonicTransform
 from tests.helpers import EPS, assert_close, needs_compiler
 
 NSIDE = 32
-SKIES = [HealpixSky(NSIDE, 65), GridSky(MW(96)), GridSky(MWSS(96))]
+SKIES = [HealpixSky(NSIDE, 65), GridSky(MW(96)), GridSky(MWSS(96), None, 2)]
 each_sky = pytest.mark.parametrize("sky", SKIES, ids=["healpix", "mw", "mwss"])
 
 
 def vectors(theta, phi):
     parts = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
     return np.stack(parts, axis=-1)
-
-
-def distances(sky, points):
-    """Angle from every sample to the nearest of some points, by comparing all."""
-    cosines = vectors(*sky.points).reshape(-1, 3) @ points.T
-    return np.arccos(np.clip(cosines.max(axis=1), -1, 1)).reshape(sky.map_shape)
 
 
 def footprint(sky):
@@ -64,17 +58,20 @@ def test_mask_is_zero_outside_and_one_a_width_inside(sky, width):
     """M = 0 where not observed, 1 where d > w, between 0 and 1 else, but for exp(-L_M w / 2)"""
     mask = footprint(sky)
     smooth = SmoothMasks(sky, mask).of_width(width)
-    depth = distances(sky, vectors(*(angle[mask == 0] for angle in sky.points)))
-    inside = depth > smooth.width
+    some = np.random.default_rng(0).choice(mask.size, 1000, replace=False)
+    points = vectors(*sky.points).reshape(-1, 3)
+    hidden = points[mask.ravel() == 0]
+    depth = np.arccos(np.clip((points[some] @ hidden.T).max(axis=1), -1, 1))
+    inside = some[depth > smooth.width]
     assert smooth.width == width
-    assert inside.sum() > 10
+    assert inside.size > 10
     assert np.all(smooth.values[mask == 0] == 0)
     assert np.all(smooth.first[mask == 0] == 0)
     assert np.all(smooth.second[mask == 0] == 0)
     concentration = (smooth.bandlimit * width - np.pi) / 2
     bound = 100 * np.exp(-concentration) + 1e4 * EPS
     assert smooth.ringing < bound
-    assert np.abs(smooth.values[inside] - 1).max() < bound
+    assert np.abs(smooth.values.ravel()[inside] - 1).max() < bound
     assert smooth.values.min() > -bound
     assert smooth.values.max() < 1 + bound
 
@@ -83,8 +80,7 @@ def test_mask_is_zero_outside_and_one_a_width_inside(sky, width):
 @pytest.mark.parametrize("sampling", [MW, MWSS])
 def test_derivatives_are_those_of_the_mask(sampling):
     """(eth-bar M)_lm = -sqrt(l(l+1)) M_lm for spin -1, and once more for spin -2"""
-    sky = GridSky(sampling(160))
-    # Observed all around a hole: what is not observed has M = 0 whatever its ringing.
+    sky = GridSky(sampling(160), None, 16)
     smooth = SmoothMasks(sky, footprint(sky)).of_width(0.55)
     assert smooth.bandlimit <= 160
     flm, first, second = (
@@ -137,7 +133,7 @@ def test_partial_weights_are_smoothed(sky):
 @each_sky
 def test_full_sky_has_the_mask_one(sky):
     smooth = SmoothMasks(sky, np.ones(sky.map_shape)).of_width(0.3)
-    assert np.all(smooth.values == 1)
+    assert_close(smooth.values, np.ones(sky.map_shape), ulps=64)
     assert not smooth.first.any()
     assert not smooth.second.any()
 
