@@ -79,7 +79,9 @@ class TransformOperator(LinearOperator):  # type: ignore[misc] # scipy carries n
             )
             return real + 1j * imaginary
         source, target = spaces
-        return np.asarray(target.to_vector(call(source.from_vector(vectors.T))).T)
+        found = target.to_vector(call(source.from_vector(vectors.T))).T
+        # A transform that stores single precision gives it, and is asked in double all the same.
+        return np.asarray(found, dtype=self.dtype)
 
     def _matmat(self, vectors: Array) -> Array:
         return self._apply(self._call, vectors, (self.domain, self.range))

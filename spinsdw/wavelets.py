@@ -255,7 +255,8 @@ class Wavelets:
         and those from ``|spin|`` to below ``|original_spin|``.
         """
         held = self.directionality.held_degrees(self.bandlimit, self.spin)
-        held |= self.tiling.scaling_kernel**2 > 1 - 8 * np.finfo(float).eps
+        share = sum(self.tiling.kernel(scale) ** 2 for scale in self.scales)
+        held |= share <= 8 * np.finfo(float).eps
         held[: abs(self.original_spin)] = False
         held[: abs(self.spin)] = True
         return ~held

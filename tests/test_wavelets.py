@@ -17,6 +17,7 @@ from spinsdw.directionality import (
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import degrees
 from spinsdw.tiling import (
+    CustomTiling,
     HybridTiling,
     NeedletTiling,
     ScaleDiscretisedTiling,
@@ -164,6 +165,14 @@ def test_other_directionalities_lose_their_lost_degrees_alone(directionality, sp
     assert_close(wavelets.admissibility[kept], np.ones(np.sum(kept)), ulps=64)
     assert np.all(wavelets.admissibility[lost] < 0.9)
     assert wavelets.admissibility_error < 64 * np.finfo(float).eps
+
+
+def test_measured_tilings_lose_no_degree():
+    """With a tolerance the scaling function may hold a little less than all of degree 0."""
+    tiling = CustomTiling([0.9995, 0.6, 0], [[0, 0.8, 0.9995]], tolerance=1e-2)
+    for directionality in (SteerableDirectionality(2), RidgeletDirectionality()):
+        wavelets = Wavelets(tiling, directionality)
+        assert not wavelets.lost_degrees[[0, 2]].any()
 
 
 def test_frame_response_is_one_for_tight_frames_and_the_square_of_the_factor_for_others():
