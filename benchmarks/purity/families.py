@@ -86,7 +86,7 @@ ORDER = (
     "needlets",
     "pseudo",
     "NaMaster",
-    "harmonic pure",
+    "harmonic-pure",
     "pure",
     "recycling",
     "projection",

@@ -23,7 +23,7 @@ STYLES = {
     "needlets": ("#CC79A7", "--", "v"),
     "pseudo": ("#56B4E9", "-", "^"),
     "NaMaster": ("#D55E00", "--", "s"),
-    "harmonic pure": ("#E69F00", "--", "D"),
+    "harmonic-pure": ("#E69F00", "--", "D"),
     "pure": ("#009E73", "-", "P"),
     "recycling": ("#8C564B", "--", "*"),
     "projection": ("#7B6FD0", "-", "d"),

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import healpy
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,6 +17,7 @@ from benchmarks.purity.catalogue import catalogue
 from benchmarks.purity.settings import SETTINGS, Setting
 from benchmarks.purity.skies import Skies
 from benchmarks.purity.surveys import SURVEYS, survey_mask
+from spinsdw.projections import Projection, project_map
 
 __all__ = ["main", "maps_figure", "masks_figure"]
 
@@ -33,26 +33,13 @@ PIXELS = 360
 def disc_of_sky(values: Array, survey: str) -> Array:
     """Return the equal-area picture of a HEALPix map around a survey, NaN outside the disc."""
     theta, phi, radius = np.radians(VIEWS[survey])
-    edge = 2 * np.sin(radius / 2)
-    x, y = np.meshgrid(np.linspace(edge, -edge, PIXELS), np.linspace(-edge, edge, PIXELS))
-    chord = np.hypot(x, y)
-    inside = chord <= edge
-    # East to the left, north up, seen from inside the sphere.
-    away, turn = 2 * np.arcsin(np.minimum(chord / 2, 1)), np.arctan2(x, -y)
-    local = np.stack(
-        [np.sin(away) * np.cos(turn), np.sin(away) * np.sin(turn), np.cos(away)]
-    ).reshape(3, -1)
-    across = np.array([[np.cos(phi), -np.sin(phi), 0], [np.sin(phi), np.cos(phi), 0], [0, 0, 1]])
-    down = np.array(
-        [[np.cos(theta), 0, np.sin(theta)], [0, 1, 0], [-np.sin(theta), 0, np.cos(theta)]]
-    )
-    pixels = healpy.vec2pix(healpy.npix2nside(values.size), *(across @ down @ local))
-    return np.where(inside, values[pixels].reshape(inside.shape), np.nan)
+    projection = Projection("equal_area", centre=(theta, phi), radius=radius, rows=PIXELS)
+    return project_map(values, projection)
 
 
 def _draw(panel: Axes, values: Array, mask: Array, survey: str, limit: float) -> None:
     picture = disc_of_sky(np.where(mask > 0, values, np.nan), survey)
-    panel.imshow(picture, origin="lower", cmap="RdBu_r", vmin=-limit, vmax=limit)
+    panel.imshow(picture, cmap="RdBu_r", vmin=-limit, vmax=limit)
     panel.set_facecolor("#d4d4d4")
     panel.set_xticks([])
     panel.set_yticks([])
@@ -88,7 +75,7 @@ def masks_figure(nside: int = 256) -> Figure:
     figure = Figure(figsize=(9.6, 3.0), layout="constrained")
     for panel, name in zip(figure.subplots(1, len(SURVEYS)), SURVEYS, strict=True):
         mask = np.asarray(survey_mask(name, nside))
-        panel.imshow(disc_of_sky(mask, name), origin="lower", cmap="Greys_r", vmin=-0.5, vmax=1)
+        panel.imshow(disc_of_sky(mask, name), cmap="Greys_r", vmin=-0.5, vmax=1)
         panel.set_title(f"{name}, {mask.mean():.1%} of the sky", fontsize="small")
         panel.set_xlabel(f"{2 * VIEWS[name][2]}° across", fontsize="small")
         panel.set_xticks([])

@@ -134,7 +134,7 @@ def _shear(results: list[Result]) -> list[str]:
     text = ["Cosmic shear behind mask D", "~~~~~~~~~~~~~~~~~~~~~~~~~~", ""]
     rows = _rows(found, lambda family: family.at("r_leak", 1), power)
     text += table("Leakage at d > 1°, in units of a B of 1 % of E", head, rows)
-    pure = [family for family in found if family.label in {"NaMaster", "harmonic pure"}]
+    pure = [family for family in found if family.label in {"NaMaster", "harmonic-pure"}]
     for peer in pure:
         rows = _rows(
             [family for family in found if family is not peer],
