@@ -61,7 +61,7 @@ def main() -> None:
     for survey in choices.surveys:
         mask = survey_mask(survey, setting.nside)
         for name in choices.methods:
-            for label, make in catalogue(name):
+            for label, make in catalogue(name, choices.model):
                 start = time.perf_counter()
                 options = {"model": choices.model, "linearity": choices.linearity}
                 method = make(np.asarray(mask), setting)

@@ -9,7 +9,9 @@ import numpy as np
 from benchmarks.purity.bands import SeparatorBands
 from benchmarks.purity.namaster import NaMasterBands
 from benchmarks.purity.settings import Setting
+from benchmarks.purity.skies import MODELS, SkyModel
 from spinsdw.separation.registry import METHODS
+from spinsdw.simulation import ARCMIN
 
 __all__ = ["NAMASTER", "Entry", "catalogue"]
 
@@ -19,23 +21,32 @@ Entry = Callable[[Array, Setting], object]
 
 NAMASTER = "NaMaster"
 APODISATIONS = tuple((profile, width) for profile in ("C1", "C2") for width in (1, 2, 4, 6, 9, 14))
+# Tapers of the smooth harmonic estimator, degrees; too wide for a survey, it is narrowed.
+WIDTHS = (2, 4, 6, 9, 14)
 
 
 def _namaster(profile: str, width: float) -> Entry:
     return lambda mask, setting: NaMasterBands(mask, setting, profile, width)
 
 
-def _own(name: str, directions: int) -> Entry:
+def _own(method: object, directions: int = 1) -> Entry:
     return lambda mask, setting: SeparatorBands.of_method(
-        name, mask, setting, directions=directions
+        method, mask, setting, directions=directions
     )
 
 
-def catalogue(name: str) -> list[tuple[str, Entry]]:
+def _wiener(model: SkyModel) -> Entry:
+    """Give the Wiener filter the spectra and the noise that the full skies have."""
+    spectra = dict(zip(("e_spectrum", "b_spectrum"), model.spectra["full"], strict=True))
+    return _own(METHODS["wiener"](**spectra, noise_level=model.noise * ARCMIN))
+
+
+def catalogue(name: str, model: str = "cmb") -> list[tuple[str, Entry]]:
     """Return the variants of a method: the label of its results, and how to make it.
 
     ``name`` is a method of `spinsdw.separation`, with ":3" for three directions; or "namaster",
-    which has a variant for every apodisation.
+    which has a variant for every apodisation, as "harmonic-pure" has for every width. "wiener" is
+    given the true spectra of the full skies of a model.
     """
     if name == "namaster":
         return [(NAMASTER, _namaster(*choice)) for choice in APODISATIONS]
@@ -43,5 +54,10 @@ def catalogue(name: str) -> list[tuple[str, Entry]]:
     if method not in METHODS:
         msg = f"method {method!r} is not known; use namaster or one of {', '.join(METHODS)}."
         raise SystemExit(msg)
+    if name == "wiener":
+        return [(name, _wiener(MODELS[model]()))]
+    if name == "harmonic-pure":
+        kind = METHODS[name]
+        return [(name, _own(kind(width=float(np.radians(width))))) for width in WIDTHS]
     label = f"{method}, N = {directions}" if directions else method
     return [(label, _own(method, int(directions or 1)))]
