@@ -77,12 +77,18 @@ SMALL = [
     (6, 0, None, {"directionality": CurveletDirectionality(), "real": True}),
     (7, 0, None, {"directionality": CurveletDirectionality(centred=True), "real": True}),
     (5, 1, None, {"directionality": CurveletDirectionality(), "multiresolution": False}),
+    (8, 7, None, {"directionality": CurveletDirectionality(), "sampling": "gl"}),
+    (1, 0, None, {"directionality": RidgeletDirectionality()}),
+    (2, 0, None, {"directionality": RidgeletDirectionality()}),
+    (3, -2, None, {"directionality": RidgeletDirectionality(), "sampling": "mwss"}),
     (8, 0, None, {"directionality": RidgeletDirectionality(), "real": True}),
     (8, 2, None, {"directionality": RidgeletDirectionality(power=1)}),
     (7, -1, None, {"directionality": RidgeletDirectionality(power=-1), "lowest_scale": 1}),
     (8, 2, 3, {"original_spin": 2}),
     (8, -1, 2, {"original_spin": -3, "lowest_scale": 1}),
     (8, 0, 3, {"original_spin": 2, "real": True}),
+    (2, 0, 1, {"original_spin": 1}),
+    (8, 3, 2, {"original_spin": 7}),
 ]
 SMALL += [
     (8, spin, directions, {"sampling": sampling, "real": spin == 0})
