@@ -20,6 +20,10 @@ __all__ = ["WaveletCoefficients"]
 
 Array = np.ndarray[Any, Any]
 
+_SINGLE = (np.dtype(np.complex64), np.dtype(np.float32))
+# Rows that a sum over values of single precision converts at a time.
+_ROWS = 64
+
 
 def _held(values: Array, name: str) -> Array:
     """Return a view that cannot be written through."""
@@ -53,6 +57,24 @@ def _fitting(given: object, values: Array, key: int | str, name: str) -> Array:
         )
         raise ShapeError(msg)
     return array
+
+
+def _keeping(values: Array, factor: Any) -> np.dtype[Any] | None:
+    """Return the type of values times a factor where they are single: single. None: as ever."""
+    if values.dtype not in _SINGLE:
+        return None
+    is_complex = np.result_type(values, factor).kind == "c"
+    return np.dtype(np.complex64 if is_complex else np.float32)
+
+
+def _square_sum(values: Array) -> float:
+    """Return the sum of the squared moduli in double precision, a few rows at a time."""
+    if values.dtype not in _SINGLE:
+        return float(np.vdot(values, values).real)
+    rows = values.reshape(-1, values.shape[-1])
+    wide = np.complex128 if values.dtype.kind == "c" else np.float64
+    parts = (rows[first : first + _ROWS].astype(wide) for first in range(0, len(rows), _ROWS))
+    return sum(float(np.vdot(part, part).real) for part in parts)
 
 
 # What multiplies a value, from the ratio T / |w| < 1.
@@ -99,6 +121,7 @@ class WaveletCoefficients:
     -----
     The arrays are held as they are, not copied, and can only be read: take ``a[j].copy()`` to
     change one.
+    Those of single precision stay so under factors, whatever the factors' type.
     Arithmetic acts on every number: ``a + b``, ``a - b``, ``2 * a``, and ``a * {j: factor}`` scale
     by scale, "scaling" being the key of the scaling part; `map` applies any function and
     `threshold` shrinks. `norm` is a sum over the samples; the integrals that analysis preserves are
@@ -297,7 +320,7 @@ class WaveletCoefficients:
 
     def norm(self) -> float:
         """Return the root of the sum of squares of all stored numbers (not an integral)."""
-        return float(np.sqrt(sum(np.vdot(v, v).real for _, v in self._items())))
+        return math.sqrt(sum(_square_sum(values) for _, values in self._items()))
 
     def _combine(
         self, other: WaveletCoefficients, operation: Callable[[Array, Array], Array]
@@ -332,9 +355,12 @@ class WaveletCoefficients:
 
     def _weigh(self, factors: Mapping[Any, Any]) -> WaveletCoefficients:
         self._check_keys(factors, "factors")
-        return self._with(
-            lambda key, values: values * _fitting(factors.get(key, 1.0), values, key, "factor")
-        )
+
+        def multiply(key: int | str, values: Array) -> Array:
+            factor = _fitting(factors.get(key, 1.0), values, key, "factor")
+            return np.multiply(values, factor, dtype=_keeping(values, factor))
+
+        return self._with(multiply)
 
     def threshold(
         self, thresholds: float | Mapping[Any, Any], *, rule: str = "hard"
@@ -393,14 +419,18 @@ class WaveletCoefficients:
             return self._weigh(factor)
         if not _is_number(factor):
             return NotImplemented
-        return self._with(lambda _, values: values * factor)
+        return self._with(
+            lambda _, values: np.multiply(values, factor, dtype=_keeping(values, factor))
+        )
 
     __rmul__ = __mul__
 
     def __truediv__(self, divisor: complex) -> WaveletCoefficients:
         if not _is_number(divisor):
             return NotImplemented
-        return self._with(lambda _, values: values / divisor)
+        return self._with(
+            lambda _, values: np.true_divide(values, divisor, dtype=_keeping(values, divisor))
+        )
 
     def __neg__(self) -> WaveletCoefficients:
         return self._with(lambda _, values: -values)
@@ -431,10 +461,12 @@ class WaveletCoefficients:
         if np.ndim(angle) != 0 or np.asarray(angle).dtype.kind not in "iuf":
             msg = f"angle={angle!r} must be one real number, in radians; steer once for each."
             raise ParameterError(msg)
-        return {
-            j: np.einsum("k,...ktp->...tp", self._orientations(j).steering_weights(angle), values)
-            for j, values in self._wavelets.items()
-        }
+        found = {}
+        for j, values in self._wavelets.items():
+            weights = self._orientations(j).steering_weights(angle)
+            stored = _keeping(values, weights) or weights.dtype
+            found[j] = np.einsum("k,...ktp->...tp", weights.astype(stored), values)
+        return found
 
     def strongest_orientation(
         self, scale: int, *, modulus: bool | None = None

@@ -1,11 +1,13 @@
 """Fourier transforms: the only file that knows the FFT library.
 
 Maps are [..., ring, phi], Fourier columns [..., m, ring], m counted modulo the number of points, or
-m = 0 .. P // 2 for real maps. The change of layout is part of the transform.
+m = 0 .. P // 2 for real maps. The change of layout is part of the transform. Arrays of single
+precision are transformed in double.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -94,10 +96,29 @@ def to_modes(values: Array, points: Array, out: Array, accuracy: float, threads:
     )
 
 
+def _is_single(values: Array) -> bool:
+    return values.dtype in {np.dtype(np.complex64), np.dtype(np.float32)}
+
+
+def _wide(values: Array) -> type[np.generic]:
+    return np.complex128 if np.iscomplexobj(values) else np.float64
+
+
+def _in_double(
+    call: Callable[[Array, Array, int], None], given: Array, out: Array, axis: int
+) -> None:
+    """Transform arrays of which at least one is of single precision: rounded once, at the end."""
+    wide = np.empty_like(out, dtype=_wide(out))
+    call(given.astype(_wide(given)), wide, axis)
+    out[...] = wide
+
+
 def _backward(series: Array, out: Array, axis: int) -> None:
     import ducc0
 
-    if np.iscomplexobj(out):
+    if _is_single(series) or _is_single(out):
+        _in_double(_backward, series, out, axis)
+    elif np.iscomplexobj(out):
         ducc0.fft.c2c(series, axes=(axis,), forward=False, out=out, nthreads=1)
     else:
         size = out.shape[axis]
@@ -107,5 +128,8 @@ def _backward(series: Array, out: Array, axis: int) -> None:
 def _forward(values: Array, out: Array, axis: int) -> None:
     import ducc0
 
+    if _is_single(values) or _is_single(out):
+        _in_double(_forward, values, out, axis)
+        return
     transform = ducc0.fft.c2c if np.iscomplexobj(values) else ducc0.fft.r2c
     transform(values, axes=(axis,), forward=True, out=out, nthreads=1)

@@ -19,6 +19,7 @@ from spinsdw.fourier import fill_maps, fill_maps_columns
 from spinsdw.parallel import run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
+from spinsdw.signals import stored_dtype
 
 __all__ = ["GridSums", "engine_of", "fill_negative_orders"]
 
@@ -64,7 +65,9 @@ class GridSums:
         Whether the maps are real.
     threads : int
         Threads to share the work.
-    workspace : ndarray, shape (at least `workspace_size`,), complex128, optional
+    dtype : str, default "complex128"
+        Type that Fourier columns and complex maps are stored in; all sums are of double precision.
+    workspace : ndarray, shape (at least `workspace_size`,), of that type, optional
         Room for the Fourier columns: fresh memory costs as much as the transform that fills it.
     """
 
@@ -73,6 +76,7 @@ class GridSums:
     mixing: Array
     real: bool
     threads: int
+    dtype: str = "complex128"
     workspace: Array | None = None
 
     @property
@@ -103,17 +107,17 @@ class GridSums:
     @property
     def working_bytes(self) -> int:
         """Bytes that a call takes beyond its input and output."""
-        return 16 * self.workspace_size + self.scratch_bytes
+        return np.dtype(self.dtype).itemsize * self.workspace_size + self.scratch_bytes
 
     @property
     def maps_itemsize(self) -> int:
         """Bytes of one number of the output maps."""
-        return np.dtype(self.maps_dtype).itemsize
+        return self.maps_dtype.itemsize
 
     @property
-    def maps_dtype(self) -> type[np.generic]:
+    def maps_dtype(self) -> np.dtype[Any]:
         """Type of the output maps."""
-        return np.float64 if self.real else np.complex128
+        return stored_dtype(self.dtype, real=self.real)
 
     @property
     def maps_shape(self) -> tuple[int, int, int]:
@@ -125,7 +129,7 @@ class GridSums:
         shape = (max(self.mixing.shape), self._n_m, self.sampling.n_rings)
         room = self.workspace
         if room is None:
-            room = np.empty(self.workspace_size, dtype=np.complex128)
+            room = np.empty(self.workspace_size, dtype=self.dtype)
         columns = room[: self.workspace_size].reshape(shape)
         # MWSS has one more Fourier mode, |m| = L, than a band-limited signal.
         if self.sampling.n_phi == 2 * self.sampling.bandlimit:

@@ -22,6 +22,7 @@ from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import conjugate_field
 from spinsdw.parallel import run_tasks, threads_for
 from spinsdw.sampling.base import Sampling
+from spinsdw.signals import stored_dtype
 
 __all__ = ["OrientationSums"]
 
@@ -47,7 +48,9 @@ class OrientationSums:
         Whether the maps are real; then ``weight_{-n} = (-1)**n conj(weight_n)``.
     threads : int
         Threads to share the work.
-    workspace : ndarray, shape (at least `workspace_size`,), complex128, optional
+    dtype : str, default "complex128"
+        Type that spectra and complex maps are stored in; all sums are of double precision.
+    workspace : ndarray, shape (at least `workspace_size`,), of that type, optional
         Room for the Fourier columns of a few orders.
     """
 
@@ -56,6 +59,7 @@ class OrientationSums:
     orientations: Orientations
     real: bool
     threads: int
+    dtype: str = "complex128"
     workspace: Array | None = None
 
     @property
@@ -66,21 +70,22 @@ class OrientationSums:
     @property
     def scratch_bytes(self) -> int:
         """Bytes that a call takes beyond its input, output and workspace."""
+        size = np.dtype(self.dtype).itemsize
         groups = [
-            sums.scratch_bytes + 16 * math.prod(sums.maps_shape) for sums, *_ in self._groups()
+            sums.scratch_bytes + size * math.prod(sums.maps_shape) for sums, *_ in self._groups()
         ]
         # The maps of the orders; `to_grid` puts complex ones in the output itself.
-        return max(groups, default=0) + 16 * math.prod(self._spectrum_shape)
+        return max(groups, default=0) + size * math.prod(self._spectrum_shape)
 
     @property
     def maps_itemsize(self) -> int:
         """Bytes of one number of the output maps."""
-        return np.dtype(self.maps_dtype).itemsize
+        return self.maps_dtype.itemsize
 
     @property
-    def maps_dtype(self) -> type[np.generic]:
+    def maps_dtype(self) -> np.dtype[Any]:
         """Type of the output maps."""
-        return np.float64 if self.real else np.complex128
+        return stored_dtype(self.dtype, real=self.real)
 
     @property
     def maps_shape(self) -> tuple[int, int, int]:
@@ -99,9 +104,8 @@ class OrientationSums:
             places = orders[rows] // self.orientations.step % self.orientations.count
             identity = np.eye(rows.size, dtype=np.complex128)
             chosen = tuple(orders[rows].tolist())
-            sums = GridSums(
-                self.sampling, chosen, identity, False, self.threads, workspace=self.workspace
-            )
+            options = (self.threads, self.dtype, self.workspace)
+            sums = GridSums(self.sampling, chosen, identity, False, *options)
             yield sums, rows, places
 
     @property
@@ -127,7 +131,7 @@ class OrientationSums:
     ) -> Array:
         """Return maps, shape (orientations, rings, phi); as `GridSums.to_grid`."""
         maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
-        spectrum = np.empty(self._spectrum_shape, dtype=np.complex128) if self.real else maps
+        spectrum = np.empty(self._spectrum_shape, dtype=self.dtype) if self.real else maps
         spectrum[...] = 0.0
         if self.real:
             flm = flm.copy()
@@ -149,7 +153,7 @@ class OrientationSums:
         quadrature: bool = False,
     ) -> None:
         """Add to ``out`` (1, L*L) the adjoint sum of `to_grid`; as `GridSums.from_grid`."""
-        spectrum = np.empty(self._spectrum_shape, dtype=np.complex128)
+        spectrum = np.empty(self._spectrum_shape, dtype=self.dtype)
         self._share_rings(lambda ring: to_orders(maps[:, ring], spectrum[:, ring]))
         target = np.zeros_like(out) if self.real else out
         if self.real:

@@ -8,7 +8,16 @@ import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
 
-__all__ = ["check_finite", "check_flag", "check_map", "check_spin", "refuse_masked", "writable"]
+__all__ = [
+    "check_dtype",
+    "check_finite",
+    "check_flag",
+    "check_map",
+    "check_spin",
+    "refuse_masked",
+    "stored_dtype",
+    "writable",
+]
 
 Array = np.ndarray[Any, Any]
 
@@ -33,6 +42,27 @@ def check_flag(value: object, name: str) -> bool:
         msg = f"{name}={value!r} must be True or False."
         raise ParameterError(msg)
     return bool(value)
+
+
+def check_dtype(dtype: object) -> str:
+    """Return the name of the type that maps are stored in: "complex128" or "complex64"."""
+    try:
+        name = np.dtype(dtype).name  # type: ignore[call-overload]
+    except TypeError:
+        name = ""
+    if dtype is None or name not in {"complex128", "complex64"}:
+        msg = (
+            f"dtype={dtype!r} must be 'complex128' or 'complex64'; real maps are then stored as "
+            "float64 or float32."
+        )
+        raise ParameterError(msg)
+    return name
+
+
+def stored_dtype(dtype: str, *, real: bool) -> np.dtype[Any]:
+    """Return the type of maps, real or complex, of the precision of a complex type."""
+    stored = np.dtype(dtype)
+    return np.empty(0, dtype=stored).real.dtype if real else stored
 
 
 def check_finite(values: Array, name: str) -> None:
@@ -60,8 +90,19 @@ def writable(values: Array) -> Array:
     return np.require(values, requirements=["C", "A", "W"])
 
 
-def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "map") -> Array:
-    """Return maps as a native C-ordered float64 (``real``) or complex128 array, checked."""
+def check_map(
+    maps: object,
+    shape: tuple[int, ...],
+    *,
+    real: bool,
+    name: str = "map",
+    may_be_single: bool = False,
+) -> Array:
+    """Return maps as a native C-ordered float64 (``real``) or complex128 array, checked.
+
+    With ``may_be_single`` those of single precision become float32 or complex64: as they are, not
+    copies of twice the size.
+    """
     refuse_masked(maps, name)
     values = np.asarray(maps)
     if values.dtype.kind not in "biufc":
@@ -76,6 +117,8 @@ def check_map(maps: object, shape: tuple[int, ...], *, real: bool, name: str = "
             f"{name} is complex but real=True was asked for; pass its real part or use real=False."
         )
         raise DataError(msg)
-    values = np.ascontiguousarray(values, dtype=np.float64 if real else np.complex128)
+    is_single = may_be_single and np.result_type(values.dtype, np.complex64) == np.complex64
+    stored = stored_dtype("complex64" if is_single else "complex128", real=real)
+    values = np.ascontiguousarray(values, dtype=stored)
     check_finite(values, name)
     return values

@@ -27,7 +27,7 @@ from spinsdw.point_sums import PointSums, check_accuracy, check_points
 from spinsdw.ring_engine import OrderSums
 from spinsdw.rotation import rotate_flm
 from spinsdw.sampling import Sampling, resolve_sampling
-from spinsdw.signals import check_flag, check_map, check_spin, writable
+from spinsdw.signals import check_dtype, check_flag, check_map, check_spin, writable
 
 __all__ = ["SpinHarmonicTransform"]
 
@@ -53,6 +53,10 @@ class SpinHarmonicTransform:
         Whether maps are real (spin 0 only): half the work and half the memory.
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
+    dtype : {"complex128", "complex64"}, default "complex128"
+        What maps are stored in; with "complex64" real ones are float32, in half the memory.
+        Sums are of double precision and harmonic coefficients complex128 in any case; what is
+        stored is rounded to 6e-8 of its size (`docs/engine`).
     max_memory : int, optional
         Bytes that a call may take by `memory_estimate`; one that would take more is refused before
         it allocates anything. No limit when None.
@@ -78,6 +82,7 @@ class SpinHarmonicTransform:
     sampling: Sampling | str = "mw"
     real: bool = False
     threads: int | None = None
+    dtype: str = "complex128"
     max_memory: int | None = None
 
     def __init__(  # noqa: PLR0913 - what describes a transform
@@ -88,6 +93,7 @@ class SpinHarmonicTransform:
         sampling: str | Sampling = "mw",
         real: bool = False,
         threads: int | None = None,
+        dtype: str = "complex128",
         max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
@@ -97,8 +103,9 @@ class SpinHarmonicTransform:
             msg = f"real=True needs spin 0, not spin={spin}; a signal with spin is complex."
             raise ParameterError(msg)
         resolve_threads(threads)
-        budget = check_max_memory(max_memory)
-        values = (bandlimit, spin, resolve_sampling(sampling, bandlimit), real, threads, budget)
+        grid = resolve_sampling(sampling, bandlimit)
+        stored, budget = check_dtype(dtype), check_max_memory(max_memory)
+        values = (bandlimit, spin, grid, real, threads, stored, budget)
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
@@ -121,7 +128,8 @@ class SpinHarmonicTransform:
     @property
     def _sums(self) -> GridSums:
         one = np.ones((1, 1), dtype=np.complex128)
-        return GridSums(self._grid, (-self.spin,), one, self.real, resolve_threads(self.threads))
+        threads = resolve_threads(self.threads)
+        return GridSums(self._grid, (-self.spin,), one, self.real, threads, self.dtype)
 
     def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
         """Return the bytes that one call of each method takes.
@@ -176,7 +184,7 @@ class SpinHarmonicTransform:
 
     def _to_coefficients(self, maps: Array, *, quadrature: bool) -> Array:
         self._check_memory("analysis" if quadrature else "adjoint_synthesis", np.shape(maps)[:-2])
-        maps = check_map(maps, self.shape, real=self.real)
+        maps = check_map(maps, self.shape, real=self.real, may_be_single=True)
         batch = maps.reshape(-1, *self.shape)
         flm = np.zeros((batch.shape[0], self.bandlimit**2), dtype=np.complex128)
         for one, out in zip(batch, flm, strict=True):
@@ -196,7 +204,7 @@ class SpinHarmonicTransform:
 
         Returns
         -------
-        ndarray, shape (..., rings, phi), complex128 (float64 if ``real``)
+        ndarray, shape (..., rings, phi), ``dtype`` (of its precision, but real, if ``real``)
             The maps; leading axes are a batch.
 
         Raises
@@ -216,7 +224,7 @@ class SpinHarmonicTransform:
         Parameters
         ----------
         maps : ndarray, shape (..., rings, phi)
-            Maps on the grid; leading axes are a batch.
+            Maps on the grid, of either precision; leading axes are a batch.
 
         Returns
         -------
@@ -402,6 +410,7 @@ class SpinHarmonicTransform:
             sampling=sampling,
             real=real,
             threads=self.threads,
+            dtype=self.dtype,
             max_memory=self.max_memory,
         )
 
@@ -431,7 +440,7 @@ class SpinHarmonicTransform:
         return self.synthesis(rotate_flm(flm, rotation, real=self.real, threads=self.threads))
 
     def raise_spin(self, maps: Array) -> Array:
-        """Apply eth (eq-eth) to maps; those of spin ``spin + 1`` on the same grid are complex128.
+        """Apply eth (eq-eth) to maps; those of spin ``spin + 1`` on the same grid are complex.
 
         Shapes and errors are those of `analysis`; spin + 1 must be below the bandlimit. Minus
         `lower_spin` of the transform of spin + 1 is the adjoint, in the integral over the sphere.

@@ -63,6 +63,7 @@ def warm_up(threads: int | None = None) -> dict[str, float]:
         "rotations": _rotations,
         "Wigner transforms": _wigner_transforms,
         "wavelet transforms": _wavelet_transforms,
+        "single precision": _single_precision,
         "HEALPix fits": _healpix_fits,
         "separations": _separations,
     }
@@ -119,6 +120,21 @@ def _run_wavelets(transform: SpinWaveletTransform) -> None:
     transform.synthesis(coefficients)
     transform.adjoint_analysis(coefficients)
     transform.adjoint_synthesis(maps)
+
+
+def _single_precision(threads: int | None) -> None:
+    for sampling in SAMPLING_NAMES:
+        for real in (False, True):
+            transform = SpinWaveletTransform(
+                BANDLIMIT,
+                0,
+                directions=2,
+                sampling=sampling,
+                real=real,
+                threads=threads,
+                dtype="complex64",
+            )
+            _run_wavelets(transform)
 
 
 def _healpix_fits(threads: int | None) -> None:

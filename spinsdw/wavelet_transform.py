@@ -15,13 +15,13 @@ from spinsdw.directionality import Directionality, Orientations, SteerableDirect
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.grid_sums import GridSums, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
-from spinsdw.memory import MemoryEstimate, check_max_memory
+from spinsdw.memory import MemoryEstimate
 from spinsdw.orientation_sums import OrientationSums
 from spinsdw.parallel import resolve_threads
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.rotated_wavelets import rotated_harmonics
 from spinsdw.sampling import Sampling, resolve_sampling
-from spinsdw.signals import check_flag, check_map, writable
+from spinsdw.signals import check_flag, check_map, stored_dtype, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
 from spinsdw.wavelet_frame import WaveletFrame
@@ -79,6 +79,10 @@ class SpinWaveletTransform(WaveletFrame):
         of -r, its inverse. S2LET synthesises with the same r: that is a transform of -r.
     threads : int, optional
         Threads to use; all cores when None. Results do not depend on it.
+    dtype : {"complex128", "complex64"}, default "complex128"
+        What maps and wavelet coefficients are stored in; with "complex64" real ones are float32, in
+        half the memory. Sums are of double precision and harmonic coefficients complex128 in any
+        case; what is stored is rounded to 6e-8 of its size (`docs/engine`).
     max_memory : int, optional
         Bytes that a call may take by `memory_estimate`; one that would take more is refused before
         it allocates anything. No limit when None.
@@ -114,6 +118,7 @@ class SpinWaveletTransform(WaveletFrame):
     directionality: Directionality | None = None
     original_spin: int = 0
     threads: int | None = None
+    dtype: str = "complex128"
     max_memory: int | None = None
 
     def __init__(  # noqa: PLR0913 - the parameters of the wavelets
@@ -131,6 +136,7 @@ class SpinWaveletTransform(WaveletFrame):
         directionality: Directionality | None = None,
         original_spin: int = 0,
         threads: int | None = None,
+        dtype: str = "complex128",
         max_memory: int | None = None,
     ) -> None:
         bandlimit = check_bandlimit(bandlimit)
@@ -144,7 +150,13 @@ class SpinWaveletTransform(WaveletFrame):
         )
         # Checks spin, real and threads.
         harmonic = SpinHarmonicTransform(
-            bandlimit, spin, sampling=grid, real=real, threads=threads, max_memory=max_memory
+            bandlimit,
+            spin,
+            sampling=grid,
+            real=real,
+            threads=threads,
+            dtype=dtype,
+            max_memory=max_memory,
         )
         values = (
             bandlimit,
@@ -159,7 +171,8 @@ class SpinWaveletTransform(WaveletFrame):
             wavelets.directionality,
             wavelets.original_spin,
             threads,
-            check_max_memory(max_memory),
+            harmonic.dtype,
+            harmonic.max_memory,
         )
         for field, value in zip(fields(self), values, strict=True):
             object.__setattr__(self, field.name, value)
@@ -242,7 +255,12 @@ class SpinWaveletTransform(WaveletFrame):
     def _scaling_transform(self) -> SpinHarmonicTransform:
         grid = self.grid_of(self._tiling.scaling_bandlimit)
         return SpinHarmonicTransform(
-            grid.bandlimit, 0, sampling=grid, real=self.real, threads=self.threads
+            grid.bandlimit,
+            0,
+            sampling=grid,
+            real=self.real,
+            threads=self.threads,
+            dtype=self.dtype,
         )
 
     @functools.cached_property
@@ -259,7 +277,7 @@ class SpinWaveletTransform(WaveletFrame):
     def _workspace(self) -> Array:
         """Return room for the Fourier columns of any scale."""
         largest = max(sums.workspace_size for sums, *_ in self._scale_sums.values())
-        return np.empty(largest, dtype=np.complex128)
+        return np.empty(largest, dtype=self.dtype)
 
     @functools.cached_property
     def _scale_sums(self) -> dict[int, tuple[GridSums | OrientationSums, Array, Array, int]]:
@@ -286,9 +304,9 @@ class SpinWaveletTransform(WaveletFrame):
         orders = tuple(orientations.orders[i] for i in kept)
         threads = resolve_threads(self.threads)
         if orientations.count % 2 and len(orders) > _MOST_MIXED_ORDERS:
-            return OrientationSums(grid, orders, orientations, self.real, threads)
+            return OrientationSums(grid, orders, orientations, self.real, threads, self.dtype)
         mixing = np.ascontiguousarray(orientations.orders_to_orientations[:, kept])
-        return GridSums(grid, orders, mixing, self.real, threads)
+        return GridSums(grid, orders, mixing, self.real, threads, self.dtype)
 
     def _scale_to_grid(self, flm: Array, scale: int, workspace: Array, *, adjoint: bool) -> Array:
         sums, psi, dual, lowest = self._scale_sums[scale]
@@ -351,7 +369,7 @@ class SpinWaveletTransform(WaveletFrame):
         sums = [sums for sums, *_ in self._scale_sums.values()]
         wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
         scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
-        room = 16 * max(one.workspace_size for one in sums)
+        room = np.dtype(self.dtype).itemsize * max(one.workspace_size for one in sums)
         working = room + max(one.scratch_bytes for one in sums)
         # The scaling part has coefficients of its own: on the way there before any scale has.
         part = scaling.input + scaling.working
@@ -449,7 +467,7 @@ class SpinWaveletTransform(WaveletFrame):
         for key, shape in self.shapes.items():
             values = coefficients.scaling if key == "scaling" else coefficients[int(key)]
             name = "scaling part" if key == "scaling" else f"scale {key}"
-            found[key] = check_map(values, shape, real=self.real, name=name)
+            found[key] = check_map(values, shape, real=self.real, name=name, may_be_single=True)
         self._check_parameters(coefficients)
         return found
 
@@ -664,13 +682,14 @@ class SpinWaveletTransform(WaveletFrame):
         checked = check_parts(self.wavelets, parts)
         scaling = self._scaling_transform
         part = resize(checked["scaling"], scaling.bandlimit)
-        wavelets = {}
+        stored, wavelets = stored_dtype(self.dtype, real=self.real), {}
         for j in self.scales:
             grid = self.grid_of(self._tiling.scale_bandlimit(j))
             orientations = self.wavelets.orientations_of(j)
-            wavelets[j] = orders_to_samples(
+            values = orders_to_samples(
                 checked[j], grid, orientations, real=self.real, threads=self.threads
             )
+            wavelets[j] = values.astype(stored, copy=False)
         return WaveletCoefficients(scaling.synthesis(part), wavelets, self._parameters)
 
     def wavelet_map(

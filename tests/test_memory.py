@@ -38,6 +38,13 @@ MAKERS = {
     "real curvelets": lambda L, **options: SpinWaveletTransform(
         L, real=True, directionality=CurveletDirectionality(), **options
     ),
+    "single": lambda L, **options: SpinHarmonicTransform(L, 2, dtype="complex64", **options),
+    "single wavelets": lambda L, **options: SpinWaveletTransform(
+        L, 2, 3, dtype="complex64", **options
+    ),
+    "single real wavelets": lambda L, **options: SpinWaveletTransform(
+        L, 0, 2, real=True, dtype="complex64", **options
+    ),
     "one resolution": lambda L, **options: SpinWaveletTransform(
         L, 2, multiresolution=False, **options
     ),
@@ -105,6 +112,34 @@ def check_estimates(transform, batch, above):
         assert (given[name].nbytes, returned) == (estimate.input, estimate.output), name
         peak = estimate.input + grown
         assert 0.98 * peak <= estimate.peak <= above * peak + 2**21, name
+
+
+@needs_compiler
+@pytest.mark.parametrize("make", [SpinHarmonicTransform, SpinWaveletTransform])
+def test_maps_of_single_precision_are_taken_as_they_are(make):
+    """Converted whole they would take three times their bytes."""
+    transform, single = make(200, 2, threads=1), make(200, 2, dtype="complex64", threads=1)
+    for name in ("analysis", "adjoint_synthesis"):
+        maps = arguments(single, 1)[name]
+        grown, returned = allocated(getattr(transform, name), maps)
+        estimate = transform.memory_estimate()[name]
+        assert grown <= 1.02 * (estimate.working + returned)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("directions", "share"), [(1, 0.7), (3, 0.57)])
+def test_single_precision_takes_half_but_for_harmonic_coefficients(directions, share):
+    """What is stored takes exactly half; of the peak, flm and what threads work in stay."""
+    single = SpinWaveletTransform(256, 2, directions, dtype="complex64", threads=1)
+    double = SpinWaveletTransform(256, 2, directions, threads=1)
+    for name in ("analysis_harmonic", "synthesis_harmonic"):
+        peaks = []
+        for transform in (single, double):
+            given = arguments(transform, 1)[name]
+            peaks.append(given.nbytes + allocated(getattr(transform, name), given)[0])
+        assert peaks[0] <= share * peaks[1]
+    one, two = (arguments(transform, 1)["synthesis"].nbytes for transform in (single, double))
+    assert 2 * one == two
 
 
 @pytest.mark.slow

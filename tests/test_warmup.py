@@ -47,10 +47,11 @@ for sampling in SAMPLINGS:
             WignerTransform(L, orders, sampling=sampling, real=real, threads=1),
             np.zeros((len(orders), L * L), dtype=complex),
         )
-    for directions in (1, 4, 5):
+    for directions, dtype in ((1, "complex128"), (4, "complex128"), (5, "complex64")):
         for spin, real in ((0, True), (0, False), (2, False), (-1, False)):
             wavelets = SpinWaveletTransform(
-                L, spin, directions, sampling=sampling, real=real, multiresolution=directions != 4
+                L, spin, directions, sampling=sampling, real=real, dtype=dtype,
+                multiresolution=directions != 4,
             )
             flm = np.zeros(L * L, dtype=complex)
             maps = wavelets.harmonic.synthesis(flm)
@@ -82,7 +83,7 @@ for directions in (1, 4):
 
 def test_warming_up_tells_the_seconds_of_each_path():
     seconds = warm_up(threads=2)
-    assert len(seconds) == 6
+    assert len(seconds) == 7
     assert all(value > 0 for value in seconds.values())
 
 

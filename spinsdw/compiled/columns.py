@@ -71,7 +71,7 @@ def fill_circles(columns, mixing, even, odd, parities, offset, circles):
 def fold_circles(circles, even, odd, parities, offset, columns):
     """Transpose of `fill_circles` without mixing: circles[i] goes to row i of the columns."""
     size, n_rings = circles.shape[2], columns.shape[2]
-    spare = np.empty(n_rings, dtype=np.complex128)
+    spare = np.empty(n_rings, dtype=columns.dtype)
     for i in range(circles.shape[0]):
         parity = parities[i]
         for j in range(circles.shape[1]):
