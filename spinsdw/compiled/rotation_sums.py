@@ -33,7 +33,7 @@ from spinsdw.compiled.rotation_tile import (
     advance_orders_2,
     advance_orders_4,
 )
-from spinsdw.compiled.vectors import WIDTH
+from spinsdw.compiled.vectors import WIDTH, sum_lanes
 
 __all__ = ["CHUNK", "LANES", "fill_blocks", "fill_rotated"]
 
@@ -215,21 +215,25 @@ def _enter(state, at, scales, inside):
 
 
 @kernel
-def _step(inside, columns, blocks, block, factors, row, first_k, state, at, scales, sums):
-    """Advance a tile by one chunk and add its lanes in range; return how many are then."""
-    factor, total, out = row * CHUNK * 3, row * CHUNK * columns * WIDTH, at + 4 * LANES
-    if inside > 0:
-        if columns == 4:
-            add_to_orders_4(blocks, block, factors, factor, first_k, state, at, sums, total)
-        else:
-            add_to_orders_2(blocks, block, factors, factor, first_k, state, at, sums, total)
-    if inside == 2 * LANES:
-        return inside
-    if columns == 4:
-        advance_orders_4(blocks, block, factors, factor, first_k, state, out, sums, total)
-    else:
-        advance_orders_2(blocks, block, factors, factor, first_k, state, out, sums, total)
-    return _enter(state, at, scales, inside)
+def _step(first_m, tile, columns, blocks, block, factors, state, scales, inside, sums):
+    """Advance a tile of every row by one chunk and add the lanes that are in range."""
+    n_rows, n_tiles = inside.shape
+    for row in range(n_rows):
+        factor, total = row * CHUNK * 3, row * CHUNK * columns * WIDTH
+        at = (row * n_tiles + tile) * 8 * LANES
+        out, first_k = at + 4 * LANES, 1.0 * (tile * LANES - first_m - row)
+        count = inside[row, tile]
+        if count > 0:
+            if columns == 4:
+                add_to_orders_4(blocks, block, factors, factor, first_k, state, at, sums, total)
+            else:
+                add_to_orders_2(blocks, block, factors, factor, first_k, state, at, sums, total)
+        if count < 2 * LANES:
+            if columns == 4:
+                advance_orders_4(blocks, block, factors, factor, first_k, state, out, sums, total)
+            else:
+                advance_orders_2(blocks, block, factors, factor, first_k, state, out, sums, total)
+            inside[row, tile] = _enter(state, at, scales, count)
 
 
 @kernel
@@ -254,20 +258,19 @@ def _fill_factors(m, first, L, shift, pole, tau, rho, factors):
 
 
 @kernel
-def _store_chunk(m, first, L, sigma, phase, sums, out):
-    """Put the sums of one chunk into out[l, +-m]."""
+def _store_chunk(m, row, first, L, columns, sigma, phase, sums, out):
+    """Put the sums of one row and chunk into out[l, +-m]."""
     sign = -1.0 if m & 1 else 1.0
-    is_real = sums.shape[1] == 2
     for i in range(max(0, m - first), min(CHUNK, L - first)):
         el = first + i
-        even, odd = 0.0j, 0.0j
-        for lane in range(WIDTH):
-            if is_real:
-                even += sums[i, 0, lane]
-                odd += complex(0.0, sums[i, 1, lane])
-            else:
-                even += complex(sums[i, 0, lane], sums[i, 1, lane])
-                odd += complex(sums[i, 2, lane], sums[i, 3, lane])
+        place = (row * CHUNK + i) * columns * WIDTH
+        if columns == 2:
+            even = complex(sum_lanes(sums, place), 0.0)
+            odd = complex(0.0, sum_lanes(sums, place + WIDTH))
+        else:
+            even = complex(sum_lanes(sums, place), sum_lanes(sums, place + WIDTH))
+            place += 2 * WIDTH
+            odd = complex(sum_lanes(sums, place), sum_lanes(sums, place + WIDTH))
         centre = el * el + el
         out[centre + m] = sigma[el] * phase * (even + odd)
         if m > 0:
@@ -307,34 +310,26 @@ def fill_rotated(first_m, stop_m, L, angles, tables, phases, starts, blocks, out
             _fill_factors(first_m + row, first, L, shift, pole, tau, rho[row], factors[row])
         for tile in range(starts[chunk + 1] - starts[chunk]):
             number = starts[chunk] + tile
-            is_start = max(tile * LANES, first_m) >= first
-            for row in range(n_rows):
-                m = first_m + row
-                if is_start:
+            if max(tile * LANES, first_m) >= first:
+                for row in range(n_rows):
+                    m = first_m + row
+                    row_sigma = blocks[number, max(0, m - first), columns + 1]
                     inside[row, tile] = _start_tile(
-                        m,
-                        first,
-                        tile,
-                        blocks[number, max(0, m - first), columns + 1],
-                        values,
-                        powers,
-                        state,
-                        scales,
-                        row,
+                        m, first, tile, row_sigma, values, powers, state, scales, row
                     )
-                inside[row, tile] = _step(
-                    inside[row, tile],
-                    columns,
-                    flat_blocks,
-                    number * CHUNK * (columns + 2) * LANES,
-                    flat_factors,
-                    row,
-                    1.0 * (tile * LANES - m),
-                    state,
-                    (row * n_tiles + tile) * 8 * LANES,
-                    scales,
-                    flat_sums,
-                )
+            block = number * CHUNK * (columns + 2) * LANES
+            _step(
+                first_m,
+                tile,
+                columns,
+                flat_blocks,
+                block,
+                flat_factors,
+                state,
+                scales,
+                inside,
+                flat_sums,
+            )
         for row in range(n_rows):
             m = first_m + row
-            _store_chunk(m, first, L, sigma[row], phases[m], sums[row], out)
+            _store_chunk(m, row, first, L, columns, sigma[row], phases[m], flat_sums, out)
