@@ -83,16 +83,20 @@ for panel, title, flm in zip(axes.flat, titles, (signal, noisy, *estimates), str
 # %%
 # A closer look
 # -------------
-# At a patch of 40 degrees in the plane of projection. Around a centre the frame of a field with
-# spin is carried along great circles, so that Q means the same all over the picture.
-from spinsdw.plotting import plot_projection
+# At a patch of 40 degrees, in the plane of projection, from samples four times as fine. Around a
+# centre the frame of a field with spin is carried along great circles, so that Q means the same
+# all over the picture.
+from spinsdw import SpinHarmonicTransform
+from spinsdw.harmonics import resize
 from spinsdw.projections import Projection, project_map
 
 patch = Projection("gnomonic", centre=(np.radians(70), np.radians(30)), radius=np.radians(20))
-figure, axes = plt.subplots(1, 3, figsize=(12, 4.4), layout="constrained")
+fine = SpinHarmonicTransform(4 * bandlimit, 2)
+figure, axes = plt.subplots(1, 3, figsize=(11, 4), layout="constrained")
 shown = zip(axes, ("signal", "signal and noise", "shrunk together"), strict=True)
 for (panel, title), flm in zip(shown, (signal, noisy, estimates[1]), strict=True):
-    q = transform.harmonic.synthesis(flm).real
-    plot_projection(panel, q, patch, title=title, unit="mK", limits=(-0.05, 0.05))
-picture = project_map(transform.harmonic.synthesis(signal), patch, spin=2)
-print(f"The picture has {picture.shape[0]} x {picture.shape[1]} points.")
+    picture = project_map(fine.synthesis(resize(flm, fine.bandlimit)), patch, spin=2)
+    image = panel.imshow(picture.real, cmap="RdBu_r", vmin=-0.2, vmax=0.2)
+    panel.set_title(title)
+    panel.set_axis_off()
+bar = figure.colorbar(image, ax=axes, label="Q (mK)", shrink=0.8)

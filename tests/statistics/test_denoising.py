@@ -80,6 +80,7 @@ def true_risks(clean, noisy, variance, areas):
     return np.array(risks)
 
 
+@needs_compiler
 @pytest.mark.parametrize(
     ("spin", "directions", "real"), [(2, 3, False), (1, 2, False), (0, 1, True), (0, 3, True)]
 )

@@ -29,6 +29,7 @@ def random_weights(transform, seed=0):
     return {key: rng.uniform(0, 1, shape) for key, shape in transform.shapes.items()}
 
 
+@needs_compiler
 @pytest.mark.parametrize("spin", [0, 2, -1])
 @pytest.mark.parametrize("sampling", ["mw", "gl"])
 def test_expectation_is_the_variance_whatever_the_weights(spin, sampling):

@@ -11,7 +11,7 @@ from spinsdw.harmonics import eb_to_spin
 from spinsdw.simulation import gaussian_flm, simulate_eb
 from spinsdw.statistics import covariance_function, wavelet_covariance, wavelet_variance
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import assert_close, random_flm
+from tests.helpers import assert_close, needs_compiler, random_flm
 
 L = 8
 SPECTRUM = 1 / (1 + np.arange(L)) ** 2
@@ -86,6 +86,7 @@ def test_variance_adds_up_to_that_of_the_field():
         assert_close(total, desired, ulps=64)
 
 
+@needs_compiler
 @pytest.mark.parametrize(("spin", "directions"), [(0, 2), (1, 3), (-2, 1)])
 def test_gaussian_fields_of_any_spin_have_that_variance_in_the_mean(spin, directions):
     """Of K complex fields the mean of |W|^2 is sigma^2 within 6 sigma^2 / sqrt(K) everywhere."""
@@ -100,6 +101,7 @@ def test_gaussian_fields_of_any_spin_have_that_variance_in_the_mean(spin, direct
         assert np.all(np.abs(mean - expected[j]) <= 6 * expected[j] / np.sqrt(count))
 
 
+@needs_compiler
 def test_parts_of_a_polarised_transform_have_the_variances_of_e_and_b():
     """Re W has that of EE, Im W that of BB; of K fields within 6 sqrt(2 / K) of it."""
     count = 400
@@ -119,6 +121,7 @@ def test_parts_of_a_polarised_transform_have_the_variances_of_e_and_b():
         assert_close(theory["real"][j] + theory["imag"][j], both[j], ulps=16)
 
 
+@needs_compiler
 def test_real_fields_have_the_same_variance():
     count = 400
     transform = SpinWaveletTransform(L, 0, 2, real=True)
