@@ -13,6 +13,7 @@ import numpy as np
 
 from spinsdw.directionality import Orientations
 from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.shrinkage import check_level, check_rule, fitting, shrink
 from spinsdw.signals import check_flag, refuse_masked
 from spinsdw.steering import strongest_orientations
 
@@ -42,23 +43,6 @@ def _is_number(value: object) -> bool:
     return isinstance(value, numbers.Complex)
 
 
-def _part_name(key: int | str) -> str:
-    return "the scaling part" if key == "scaling" else f"scale {key}"
-
-
-def _fitting(given: object, values: Array, key: int | str, name: str) -> Array:
-    """Return what was given for a part as an array, after checking that it broadcasts to it."""
-    array = np.asarray(given)
-    sizes = zip(reversed(array.shape), reversed(values.shape), strict=False)
-    if array.ndim > values.ndim or any(one not in {1, other} for one, other in sizes):
-        msg = (
-            f"{name} for {_part_name(key)} has shape {array.shape}; it must be a number or "
-            f"broadcast to {values.shape}."
-        )
-        raise ShapeError(msg)
-    return array
-
-
 def _keeping(values: Array, factor: Any) -> np.dtype[Any] | None:
     """Return the type of values times a factor where they are single: single. None: as ever."""
     if values.dtype not in _SINGLE:
@@ -75,23 +59,6 @@ def _square_sum(values: Array) -> float:
     wide = np.complex128 if values.dtype.kind == "c" else np.float64
     parts = (rows[first : first + _ROWS].astype(wide) for first in range(0, len(rows), _ROWS))
     return sum(float(np.vdot(part, part).real) for part in parts)
-
-
-# What multiplies a value, from the ratio T / |w| < 1.
-_SHRINKAGES: dict[str, Callable[[Array], Array]] = {
-    "hard": np.ones_like,
-    "soft": lambda ratio: 1 - ratio,
-    "garrote": lambda ratio: 1 - ratio**2,
-}
-
-
-def _shrink(values: Array, level: Array, factor: Callable[[Array], Array]) -> Array:
-    size = np.abs(values)
-    if size.dtype.kind != "f":
-        size = size.astype(np.float64)
-    is_kept = size > level
-    ratio = np.divide(level, size, out=np.zeros_like(size), where=is_kept)
-    return np.where(is_kept, factor(ratio) * values, 0)
 
 
 class WaveletCoefficients:
@@ -357,7 +324,7 @@ class WaveletCoefficients:
         self._check_keys(factors, "factors")
 
         def multiply(key: int | str, values: Array) -> Array:
-            factor = _fitting(factors.get(key, 1.0), values, key, "factor")
+            factor = fitting(factors.get(key, 1.0), values, key, "factor")
             return np.multiply(values, factor, dtype=_keeping(values, factor))
 
         return self._with(multiply)
@@ -397,22 +364,17 @@ class WaveletCoefficients:
         >>> float(one.threshold(1.0, rule="soft")[0].item())
         -2.0
         """
-        if rule not in _SHRINKAGES:
-            msg = f"rule={rule!r} must be one of {sorted(_SHRINKAGES)}; 'hard' keeps or drops."
-            raise ParameterError(msg)
+        check_rule(rule)
         given = thresholds if isinstance(thresholds, Mapping) else dict.fromkeys(self, thresholds)
         self._check_keys(given, "thresholds")
 
-        def shrink(key: int | str, values: Array) -> Array:
+        def shrink_part(key: int | str, values: Array) -> Array:
             if key not in given:
                 return values
-            level = _fitting(given[key], values, key, "threshold")
-            if level.dtype.kind not in "biuf" or not np.all(level >= 0):
-                msg = f"threshold for {_part_name(key)} must hold real numbers of at least 0."
-                raise DataError(msg)
-            return _shrink(values, level, _SHRINKAGES[rule])
+            level = fitting(given[key], values, key, "threshold")
+            return shrink(values, check_level(level, key), rule)
 
-        return self._with(shrink)
+        return self._with(shrink_part)
 
     def __mul__(self, factor: complex | Mapping[Any, Any]) -> WaveletCoefficients:
         if isinstance(factor, Mapping):

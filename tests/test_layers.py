@@ -25,7 +25,7 @@ LAYERS = (  # bottom to top
     {"ring_engine"},
     {"mirror_engine"},
     {"harmonics"},
-    {"signals"},
+    {"signals", "shrinkage"},
     {"rotation"},
     {"sampling"},
     {"grid_sums", "ring_blocks"},
