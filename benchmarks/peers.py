@@ -35,6 +35,9 @@ Array = np.ndarray[Any, Any]
 Call = Callable[[], Any]
 
 
+_GEOMETRIES = {"mw": "MW", "gl": "GL"}
+
+
 def m_major(bandlimit: int) -> tuple[Array, Array]:
     """Return degree and order of each coefficient the way ducc stores them: m >= 0, l fastest."""
     m = np.repeat(np.arange(bandlimit), bandlimit - np.arange(bandlimit))
@@ -107,7 +110,10 @@ def ducc0_wavelet_analysis(transform: SpinWaveletTransform, flm: Array, *, threa
                 sizes = {"lmax": transform.bandlimits[scale] - 1, "ntheta": rings, "nphi": points}
                 calls.append({"alm": alm, "spin": spin, **sizes})
     return lambda: [
-        ducc0.sht.synthesis_2d(**call, geometry="MW", nthreads=threads) for call in calls
+        ducc0.sht.synthesis_2d(
+            **call, geometry=_GEOMETRIES[transform.sampling.name], nthreads=threads
+        )
+        for call in calls
     ]
 
 
@@ -126,19 +132,61 @@ def ducc0_wavelet_synthesis(
                 lmax = transform.bandlimits[scale] - 1
                 calls.append({"map": np.ascontiguousarray(maps), "spin": spin, "lmax": lmax})
     return lambda: [
-        ducc0.sht.analysis_2d(**call, geometry="MW", nthreads=threads) for call in calls
+        ducc0.sht.analysis_2d(
+            **call, geometry=_GEOMETRIES[transform.sampling.name], nthreads=threads
+        )
+        for call in calls
     ]
 
 
+def ducc0_rotation(
+    transform: SpinHarmonicTransform, flm: Array, rotation: tuple[float, ...], *, threads: int
+) -> Call:
+    """One real field, or the two that a complex one is."""
+    alm = np.ascontiguousarray(pack_flm(flm, transform.spin)[: 1 if transform.real else 2])
+    lmax = transform.bandlimit - 1
+    return lambda: ducc0.sht.rotate_alm(alm, lmax, *rotation[::-1], nthreads=threads)
+
+
+def ducc0_points(
+    transform: SpinHarmonicTransform, flm: Array, points: Array, accuracy: float, *, threads: int
+) -> Call:
+    """Synthesis at points."""
+    alm = np.ascontiguousarray(pack_flm(flm, transform.spin)[: 1 if transform.real else 2])
+    return lambda: ducc0.sht.synthesis_general(
+        alm=alm,
+        spin=transform.spin,
+        lmax=transform.bandlimit - 1,
+        loc=points,
+        epsilon=accuracy,
+        nthreads=threads,
+    )
+
+
+def ducc0_adjoint_points(
+    transform: SpinHarmonicTransform, values: Array, points: Array, accuracy: float, *, threads: int
+) -> Call:
+    """Adjoint of `ducc0_points`."""
+    maps = _as_real_maps(values, is_real=transform.real)
+    return lambda: ducc0.sht.adjoint_synthesis_general(
+        map=maps,
+        spin=transform.spin,
+        lmax=transform.bandlimit - 1,
+        loc=points,
+        epsilon=accuracy,
+        nthreads=threads,
+    )
+
+
 def ducc0_synthesis(transform: SpinHarmonicTransform, flm: Array, *, threads: int) -> Call:
-    """Spin 0 of a real map, or spin 2 of (Q, U), on the McEwen-Wiaux grid."""
+    """Spin 0 of a real map, or spin 2 of (Q, U), on the transform's grid."""
     rings, points = transform.shape
     alm = np.ascontiguousarray(pack_flm(flm, transform.spin)[: 1 if transform.real else 2])
     return lambda: ducc0.sht.synthesis_2d(
         alm=alm,
         spin=transform.spin,
         lmax=transform.bandlimit - 1,
-        geometry="MW",
+        geometry=_GEOMETRIES[transform.sampling.name],
         ntheta=rings,
         nphi=points,
         nthreads=threads,
@@ -156,7 +204,7 @@ def ducc0_analysis(transform: SpinHarmonicTransform, maps: Array, *, threads: in
         map=values,
         spin=transform.spin,
         lmax=transform.bandlimit - 1,
-        geometry="MW",
+        geometry=_GEOMETRIES[transform.sampling.name],
         nthreads=threads,
     )
 

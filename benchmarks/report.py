@@ -23,7 +23,7 @@ Rows = list[Row]
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results.json"
 OURS = "spinsdw"
-COMPARED = ("wavelets", "pys2let", "harmonic", "healpix")
+COMPARED = ("wavelets", "pys2let", "harmonic", "healpix", "geometry")
 NAMES = {"healpix": "HEALPix ", "harmonic": "spin ", "batch": "batch, "}
 
 CAPTIONS = {
@@ -287,6 +287,11 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], Callable[[Rows], list[str]]]] = 
     "pys2let": ("From maps, against pys2let", ("maps",), lambda rows: _comparisons(rows, ["L"])),
     "harmonic": ("Spin transforms", ("harmonic",), lambda rows: _comparisons(rows, ["L"])),
     "healpix": ("HEALPix", (), lambda rows: _comparisons(rows, ["nside"])),
+    "geometry": (
+        "Rotations, points, other grids",
+        (),
+        lambda rows: _comparisons(rows, ["L"]),
+    ),
     "batch": ("Batches", (), _batch),
     "threads": ("Threads", (), _threads),
     "growth": ("Growth", (), _growth),

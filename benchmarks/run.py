@@ -21,6 +21,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import geometry
 import resources
 import speed
 from plans import PLANS, Plan
@@ -42,6 +43,7 @@ JOBS: dict[str, Job] = {
     "memory": resources.memory,
     "healpix": speed.healpix,
     "harmonic": speed.harmonic,
+    "geometry": geometry.geometry,
     "wavelets": speed.wavelets,
     "batch": speed.batch,
     "threads": speed.threads,

@@ -20,7 +20,17 @@ from spinsdw.ring_transform import HealpixTransform
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
-__all__ = ["batch", "growth", "harmonic", "healpix", "pys2let", "random_flm", "threads", "wavelets"]
+__all__ = [
+    "batch",
+    "compare",
+    "growth",
+    "harmonic",
+    "healpix",
+    "pys2let",
+    "random_flm",
+    "threads",
+    "wavelets",
+]
 
 Array = np.ndarray[Any, Any]
 Row = dict[str, Any]
@@ -46,7 +56,8 @@ def random_flm(bandlimit: int, spin: int, *, real: bool = False, seed: int = 0) 
     return flm
 
 
-def _row(calls: Calls, plan: Plan, fewest: int | None = None, **what: Any) -> Row:
+def compare(calls: Calls, plan: Plan, fewest: int | None = None, **what: Any) -> Row:
+    """Time calls in turn; ``what`` they do comes first in the row."""
     found = best_of(calls, fewest=fewest or plan.fewest, budget=plan.budget)
     return {**what, "seconds": found.best, "median": found.median, "rounds": found.rounds}
 
@@ -75,12 +86,12 @@ def _wavelet_rows(
         "spinsdw": partial(transform.analysis_harmonic, flm),
         "ducc0": peers.ducc0_wavelet_analysis(transform, flm, threads=threads),
     }
-    yield _row(calls, plan, direction="harmonic to wavelet", **what)
+    yield compare(calls, plan, direction="harmonic to wavelet", **what)
     calls = {
         "spinsdw": partial(transform.synthesis_harmonic, coefficients),
         "ducc0": peers.ducc0_wavelet_synthesis(transform, coefficients, threads=threads),
     }
-    yield _row(calls, plan, direction="wavelet to harmonic", **what)
+    yield compare(calls, plan, direction="wavelet to harmonic", **what)
 
 
 def harmonic(plan: Plan) -> Iterator[Row]:
@@ -103,12 +114,12 @@ def _harmonic_rows(
         "spinsdw": partial(transform.synthesis, flm),
         "ducc0": peers.ducc0_synthesis(transform, flm, threads=threads),
     }
-    yield _row(calls, plan, direction="synthesis", **what)
+    yield compare(calls, plan, direction="synthesis", **what)
     calls = {
         "spinsdw": partial(transform.analysis, maps),
         "ducc0": peers.ducc0_analysis(transform, maps, threads=threads),
     }
-    yield _row(calls, plan, direction="analysis", **what)
+    yield compare(calls, plan, direction="analysis", **what)
 
 
 def healpix(plan: Plan) -> Iterator[Row]:
@@ -132,12 +143,12 @@ def _healpix_rows(
         "spinsdw": partial(transform.synthesis, flm),
         "ducc0": peers.ducc0_healpix(transform, flm, threads=threads),
     }
-    yield _row(calls, plan, direction="synthesis", **what)
+    yield compare(calls, plan, direction="synthesis", **what)
     calls = {
         "spinsdw": partial(transform.adjoint_synthesis, maps),
         "ducc0": peers.ducc0_adjoint_healpix(transform, maps, threads=threads),
     }
-    yield _row(calls, plan, direction="adjoint synthesis", **what)
+    yield compare(calls, plan, direction="adjoint synthesis", **what)
 
 
 def pys2let(plan: Plan) -> Iterator[Row]:
@@ -161,12 +172,12 @@ def _pys2let_rows(transform: SpinWaveletTransform, maps: Array, plan: Plan) -> I
         "spinsdw": partial(transform.analysis, maps),
         "pys2let": peers.pys2let_analysis(transform, maps),
     }
-    yield _row(calls, plan, fewest, direction="map to wavelet", **what)
+    yield compare(calls, plan, fewest, direction="map to wavelet", **what)
     calls = {
         "spinsdw": partial(transform.synthesis, coefficients),
         "pys2let": peers.pys2let_synthesis(transform, maps),
     }
-    yield _row(calls, plan, fewest, direction="wavelet to map", **what)
+    yield compare(calls, plan, fewest, direction="wavelet to map", **what)
 
 
 def batch(plan: Plan) -> Iterator[Row]:
@@ -187,12 +198,12 @@ def _batch_rows(transform: SpinWaveletTransform, flms: Array, plan: Plan) -> Ite
         "one call": partial(transform.analysis_harmonic, flms),
         "single calls": lambda: [transform.analysis_harmonic(flm) for flm in flms],
     }
-    yield _row(calls, plan, direction="harmonic to wavelet", **what)
+    yield compare(calls, plan, direction="harmonic to wavelet", **what)
     calls = {
         "one call": partial(transform.synthesis_harmonic, together),
         "single calls": lambda: [transform.synthesis_harmonic(one) for one in apart],
     }
-    yield _row(calls, plan, direction="wavelet to harmonic", **what)
+    yield compare(calls, plan, direction="wavelet to harmonic", **what)
 
 
 def threads(plan: Plan) -> Iterator[Row]:
@@ -210,8 +221,8 @@ def threads(plan: Plan) -> Iterator[Row]:
             forward[peer] = peers.ducc0_wavelet_analysis(transform, flm, threads=count)
             backward[peer] = peers.ducc0_wavelet_synthesis(transform, coefficients, threads=count)
         what = {"signal": "spin 2", "L": bandlimit, "N": 3}
-        yield _row(forward, plan, direction="harmonic to wavelet", **what)
-        yield _row(backward, plan, direction="wavelet to harmonic", **what)
+        yield compare(forward, plan, direction="harmonic to wavelet", **what)
+        yield compare(backward, plan, direction="wavelet to harmonic", **what)
 
 
 def growth(plan: Plan) -> Iterator[Row]:
@@ -231,5 +242,5 @@ def growth(plan: Plan) -> Iterator[Row]:
             forward[name] = partial(transform.analysis_harmonic, flm)
             backward[name] = partial(transform.synthesis_harmonic, coefficients)
         what = {"over": over, "L": pairs[0][0], "N": pairs[0][1], "threads": 1}
-        yield _row(forward, plan, direction="harmonic to wavelet", **what)
-        yield _row(backward, plan, direction="wavelet to harmonic", **what)
+        yield compare(forward, plan, direction="harmonic to wavelet", **what)
+        yield compare(backward, plan, direction="wavelet to harmonic", **what)
