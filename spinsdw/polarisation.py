@@ -289,7 +289,7 @@ class EBSeparator:
 
         Parameters
         ----------
-        q, u : ndarray, real, shape (..., *map)
+        q, u : ndarray, real, shape (..., map)
             Stokes parameters, COSMO frame, any unit: HEALPix maps (12 nside^2,), MW maps
             (G, 2 G - 1) or MWSS maps (G + 1, 2 G) with G >= L, pixelised as the mask is; leading
             axes are a batch. Pixels where the mask is 0 may hold anything.
