@@ -63,7 +63,7 @@ class WaveletFrame(ABC):
 
         Examples
         --------
-        >>> import numpy as np
+        >>> from spinsdw.wavelet_transform import SpinWaveletTransform
         >>> transform = SpinWaveletTransform(16, spin=2, directions=3)
         >>> parts = transform.analysis_wigner(np.ones(256))
         >>> parts[2].shape, parts["scaling"].shape
