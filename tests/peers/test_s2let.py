@@ -305,3 +305,38 @@ def test_wigner_door_agrees(dilation, bandlimit, lowest_scale, directions, spin,
         (transform.adjoint_analysis_wigner(noise), pys2let.analysis_adjoint_lmn2lm),
     ):
         assert_close(ours, peer(*vectors, *arguments), ulps=64)
+
+
+@pytest.mark.parametrize(
+    ("directions", "spin", "upsample"), [(2, 2, 0), (3, 0, 0), (4, -1, 0), (3, 2, 1)]
+)
+def test_adjoints_agree_for_any_directions(directions, spin, upsample):
+    """The peer stores 2N - 1 gammas, W' = E W with E^T E = (2N - 1)/N, so its adjoints are ours
+
+        A'^T W' = (2N - 1)/N A^T W,    S'^T f = N/(2N - 1) E S^T f
+
+    of the wavelets; of the scaling part without a factor. Compared in what a synthesis sees.
+    """
+    arguments = (2.0, 16, 2, directions, spin, upsample)
+    transform = make_transform(*arguments)
+    ratio = (2 * directions - 1) / directions
+    factors = dict.fromkeys(transform.scales, ratio)
+    some = transform.analysis_harmonic(random_flm(16, spin, seed=1)) * {3: 0.3, "scaling": 2.0}
+    peer = pys2let.analysis_adjoint_wav2px(*coefficients_to_s2let(transform, some), *arguments)
+    ours = transform.adjoint_analysis(some * factors)
+    found = transform.harmonic.adjoint_synthesis(ours)
+    desired = transform.harmonic.adjoint_synthesis(peer.reshape(ours.shape))
+    assert_close(found, desired, ulps=64 * 16)
+
+    noise = random_like(np.empty(transform.harmonic.shape, dtype=complex))
+    stored = pys2let.synthesis_adjoint_px2wav(noise.ravel(), *arguments)
+    peer = s2let_to_coefficients(transform, *stored) * factors
+    ours = transform.adjoint_synthesis(noise)
+    for seed in range(3):
+        probe = transform.analysis_harmonic(random_flm(16, spin, seed=seed))
+        one, other = (
+            np.vdot(probe.scaling, found.scaling)
+            + sum(np.vdot(probe[scale], found[scale]) for scale in transform.scales)
+            for found in (ours, peer)
+        )
+        assert abs(one - other) < 1e-13 * probe.norm() * ours.norm()
