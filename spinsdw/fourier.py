@@ -7,7 +7,9 @@ precision are transformed in double.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -96,8 +98,16 @@ def to_modes(values: Array, points: Array, out: Array, accuracy: float, threads:
     )
 
 
+@functools.cache
+def _library() -> ModuleType:
+    # Imported when first needed, and once: rings of a cap are thousands of calls.
+    import ducc0
+
+    return ducc0.fft
+
+
 def _is_single(values: Array) -> bool:
-    return values.dtype in {np.dtype(np.complex64), np.dtype(np.float32)}
+    return values.dtype.char in "fF"
 
 
 def _wide(values: Array) -> type[np.generic]:
@@ -114,22 +124,20 @@ def _in_double(
 
 
 def _backward(series: Array, out: Array, axis: int) -> None:
-    import ducc0
-
+    fft = _library()
     if _is_single(series) or _is_single(out):
         _in_double(_backward, series, out, axis)
-    elif np.iscomplexobj(out):
-        ducc0.fft.c2c(series, axes=(axis,), forward=False, out=out, nthreads=1)
+    elif out.dtype.kind == "c":
+        fft.c2c(series, axes=(axis,), forward=False, out=out, nthreads=1)
     else:
         size = out.shape[axis]
-        ducc0.fft.c2r(series, axes=(axis,), forward=False, lastsize=size, out=out, nthreads=1)
+        fft.c2r(series, axes=(axis,), forward=False, lastsize=size, out=out, nthreads=1)
 
 
 def _forward(values: Array, out: Array, axis: int) -> None:
-    import ducc0
-
     if _is_single(values) or _is_single(out):
         _in_double(_forward, values, out, axis)
         return
-    transform = ducc0.fft.c2c if np.iscomplexobj(values) else ducc0.fft.r2c
+    fft = _library()
+    transform = fft.c2c if values.dtype.kind == "c" else fft.r2c
     transform(values, axes=(axis,), forward=True, out=out, nthreads=1)

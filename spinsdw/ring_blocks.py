@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,79 +34,98 @@ def mirror_engine(nside: int, bandlimit: int, order: int) -> MirrorEngine:
     return MirrorEngine(bandlimit, north, order)
 
 
+class _Run(NamedTuple):
+    """Some rings of one number of points, as arrays (maps, rings, modes or points)."""
+
+    mode_shape: tuple[int, int, int]
+    mode_offset: int
+    shape: tuple[int, int, int]
+    offset: int
+    strides: tuple[int, int, int]
+
+    def views(self, modes: Array, pixels: Array) -> tuple[Array, Array]:
+        """Return the run's parts of all modes and of all pixels; caps hold thousands of runs."""
+        return (
+            np.ndarray(self.mode_shape, modes.dtype, modes, self.mode_offset),
+            np.ndarray(self.shape, pixels.dtype, pixels, self.offset, self.strides),
+        )
+
+
+class _Layout(NamedTuple):
+    """Where the modes of a block lie: those of ring r of map i begin at ``starts[i, r]``."""
+
+    size: int
+    starts: Array
+    runs: tuple[_Run, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class RingBlock:
-    """Some rings between their Fourier columns and their pixels, mirror images next to each other.
+    """Some rings between their Fourier columns and their pixels.
 
-    A run is some neighbours of one number of points: (rings, points, first pixel).
+    A run is (rings, points, first pixel, pixels from ring to ring): neighbours in the belt, and in
+    the caps a ring and its mirror image.
     """
 
     rings: Array
     sizes: Array
     phis: Array
     limits: Array
-    runs: tuple[tuple[int, int, int], ...]
+    total: int
+    runs: tuple[tuple[int, int, int, int], ...]
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - blocks are few and shared
-    def _starts(self, maps: int, real: bool) -> Array:
-        """Where the modes of each map's rings begin: runs lie as (maps, rings, modes)."""
-        parts, place = [], 0
-        for count, points, _ in self.runs:
-            modes = points // 2 + 1 if real else points
-            parts.append(place + np.arange(maps * count).reshape(maps, count) * modes)
+    def _layout(self, maps: int, is_real: bool) -> _Layout:
+        starts, runs, place = [], [], 0
+        size = 8 if is_real else 16
+        for count, points, first, step in self.runs:
+            modes = points // 2 + 1 if is_real else points
+            starts.append(place + np.arange(maps * count).reshape(maps, count) * modes)
+            shapes = (maps, count, modes), 16 * place, (maps, count, points)
+            runs.append(_Run(*shapes, size * first, (size * self.total, size * step, size)))
             place += maps * count * modes
-        return np.concatenate(parts, axis=1)
-
-    def _room(self, pixels: Array) -> tuple[Array, Array]:
-        """Return room for the modes, and where each ring's begin."""
-        maps, is_real = len(pixels), not np.iscomplexobj(pixels)
-        modes = self.sizes // 2 + 1 if is_real else self.sizes
-        room = np.empty(maps * int(modes.sum()), dtype=np.complex128)
-        return room, self._starts(maps, is_real)
-
-    def _transform(self, call: Callable[[Array, Array], None], modes: Array, pixels: Array) -> None:
-        """Call for every run with (modes, pixels) of shape (maps, rings, modes or points)."""
-        maps, place = len(pixels), 0
-        for count, points, first in self.runs:
-            part = pixels[:, first : first + count * points].reshape(maps, count, points)
-            size = points // 2 + 1 if pixels.dtype == np.float64 else points
-            stop = place + maps * count * size
-            call(modes[place:stop].reshape(maps, count, size), part)
-            place = stop
+        return _Layout(place, np.concatenate(starts, axis=1), tuple(runs))
 
     def fill_pixels(self, columns: Array, pixels: Array) -> None:
         """Fill these rings of maps (maps, all pixels) from columns (maps, m, all rings)."""
         from spinsdw.compiled.folding import fill_folded
 
-        modes, starts = self._room(pixels)
-        geometry = (self.rings, self.sizes, self.phis, self.limits, starts)
-        fill_folded(columns, *geometry, pixels.dtype == np.float64, modes)
-        self._transform(from_series, modes, pixels)
+        is_real = pixels.dtype == np.float64
+        layout = self._layout(len(pixels), is_real)
+        modes = np.empty(layout.size, dtype=np.complex128)
+        geometry = (self.rings, self.sizes, self.phis, self.limits, layout.starts)
+        fill_folded(columns, *geometry, is_real, modes)
+        for run in layout.runs:
+            from_series(*run.views(modes, pixels))
 
     def fill_columns(self, pixels: Array, columns: Array) -> None:
         """Fill these rings of the columns from those of the maps: the adjoint."""
         from spinsdw.compiled.folding import fill_unfolded
 
-        modes, starts = self._room(pixels)
-        self._transform(lambda series, values: to_series(values, series), modes, pixels)
-        geometry = (self.rings, self.sizes, self.phis, self.limits, starts)
-        fill_unfolded(modes, *geometry, pixels.dtype == np.float64, columns)
+        is_real = pixels.dtype == np.float64
+        layout = self._layout(len(pixels), is_real)
+        modes = np.empty(layout.size, dtype=np.complex128)
+        for run in layout.runs:
+            series, values = run.views(modes, pixels)
+            to_series(values, series)
+        geometry = (self.rings, self.sizes, self.phis, self.limits, layout.starts)
+        fill_unfolded(modes, *geometry, is_real, columns)
 
 
 def _groups(nside: int) -> list[tuple[list[int], list[tuple[int, int]]]]:
-    """Split the rings into blocks: (rings, runs of them as (first ring, rings))."""
+    """Split the rings into blocks: (rings, runs of them as (first place, rings))."""
     last = 4 * nside - 2
     groups: list[tuple[list[int], list[tuple[int, int]]]] = []
     rings: list[int] = []
     for first in range(nside - 1):
         rings += [first, last - first]
         if 4 * (first + 1) * len(rings) >= _TASK_SIZE or first == nside - 2:
-            groups.append((rings, [(r, 1) for r in rings]))
+            groups.append((rings, [(k, 2) for k in range(0, len(rings), 2)]))
             rings = []
     count = max(_FEWEST_RINGS, _TASK_SIZE // (4 * nside))
     for start in range(nside - 1, 3 * nside, count):
         rings = list(range(start, min(start + count, 3 * nside)))
-        groups.append((rings, [(start, len(rings))]))
+        groups.append((rings, [(0, len(rings))]))
     # The large ones first, so that threads finish together.
     return groups[::-1]
 
@@ -119,13 +137,13 @@ def ring_blocks(nside: int, bandlimit: int, order: int) -> list[RingBlock]:
     sizes, phis, starts = layout.n_phi, layout.first_longitudes, layout.starts
     north = mirror_engine(nside, bandlimit, order).limits
     limits = np.concatenate([north, north[-2::-1]])
-    return [
-        RingBlock(
-            np.array(rings),
-            sizes[rings],
-            phis[rings],
-            limits[rings],
-            tuple((count, int(sizes[r]), int(starts[r])) for r, count in runs),
-        )
-        for rings, runs in _groups(nside)
-    ]
+    blocks = []
+    for rings, places in _groups(nside):
+        runs = []
+        for place, count in places:
+            first, second = rings[place], rings[place + min(count, 2) - 1]
+            step = int(starts[second] - starts[first])
+            runs.append((count, int(sizes[first]), int(starts[first]), step))
+        geometry = (np.array(rings), sizes[rings], phis[rings], limits[rings])
+        blocks.append(RingBlock(*geometry, layout.n_pixels, tuple(runs)))
+    return blocks

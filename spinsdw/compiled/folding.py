@@ -20,7 +20,7 @@ from spinsdw.compiled.jit import kernel
 
 __all__ = ["fill_folded", "fill_unfolded"]
 
-_STRIDE = 32
+_STRIDE = 64
 
 
 @kernel
@@ -47,11 +47,12 @@ def _fill_steps(phis, steps):
 
 
 @kernel
-def _prepare_phases(m, phi, steps, held, phases):
-    """Return where phases[., t] = e^{i (m + t) phi}, one product away from sine and cosine.
+def _prepare_phases(m, r, phis, steps, held, phases):
+    """Return where phases[., t] = e^{i (m + t) phis[r]}, one product away from sine and cosine.
 
     The last two longitudes are held: every other ring of the belt has the same.
     """
+    phi = phis[r]
     if held[0] == phi:
         return 0
     if held[1] == phi:
@@ -59,37 +60,41 @@ def _prepare_phases(m, phi, steps, held, phases):
     place = int(held[2])
     base = complex(math.cos(m * phi), math.sin(m * phi))
     for t in range(_STRIDE):
-        phases[place, t] = base * steps[t]
+        phases[place, t] = base * steps[r, t]
     held[place] = phi
     held[2] = 1 - place
     return place
 
 
 @kernel
-def _add_modes(first, stop, ring, points, phases, columns, modes):
+def _add_modes(first, stop, i, ring, points, phases, place, columns, start, folded):
     """Add orders first <= m < stop and -m of one ring to its modes."""
-    n_m = columns.shape[0]
+    n_m = columns.shape[1]
     k = first % points
     for m in range(first, stop):
-        phase = phases[m - first]
+        phase = phases[place, m - first]
         opposite = points - k if k > 0 else 0
-        modes[k] += phase * columns[m, ring]
-        modes[opposite] += phase.conjugate() * columns[n_m - m, ring]
+        folded[start + k] += phase * columns[i, m, ring]
+        folded[start + opposite] += phase.conjugate() * columns[i, n_m - m, ring]
         k = k + 1 if k + 1 < points else 0
 
 
 @kernel
-def _add_real_modes(first, stop, ring, points, phases, columns, modes):
+def _add_real_modes(first, stop, i, ring, points, phases, place, columns, start, folded):
     """Add F e^{i k phi} and its conjugate to the half series of one ring."""
+    if 2 * stop <= points:
+        for m in range(first, stop):
+            folded[start + m] = phases[place, m - first] * columns[i, m, ring]
+        return
     k = first % points
     for m in range(first, stop):
-        value = phases[m - first] * columns[m, ring]
+        value = phases[place, m - first] * columns[i, m, ring]
         if k == 0 or 2 * k == points:
-            modes[k] += 2.0 * value.real
+            folded[start + k] += 2.0 * value.real
         elif 2 * k < points:
-            modes[k] += value
+            folded[start + k] += value
         else:
-            modes[points - k] += value.conjugate()
+            folded[start + points - k] += value.conjugate()
         k = k + 1 if k + 1 < points else 0
 
 
@@ -108,36 +113,36 @@ def fill_folded(columns, rings, sizes, phis, limits, starts, is_real, folded):
     for first in range(1, _largest(limits), _STRIDE):
         held[0] = held[1] = np.nan
         for r in range(rings.size):
-            stop = min(first + _STRIDE, limits[r])
-            place = _prepare_phases(first, phis[r], steps[r], held, phases)
+            stop, ring, points = min(first + _STRIDE, limits[r]), rings[r], sizes[r]
+            place = _prepare_phases(first, r, phis, steps, held, phases) if stop > first else 0
             for i in range(columns.shape[0]):
-                modes = folded[starts[i, r] :]
+                start = starts[i, r]
                 if is_real:
                     _add_real_modes(
-                        first, stop, rings[r], sizes[r], phases[place], columns[i], modes
+                        first, stop, i, ring, points, phases, place, columns, start, folded
                     )
                 else:
-                    _add_modes(first, stop, rings[r], sizes[r], phases[place], columns[i], modes)
+                    _add_modes(first, stop, i, ring, points, phases, place, columns, start, folded)
 
 
 @kernel
-def _take_modes(first, stop, ring, points, phases, modes, columns):
-    n_m = columns.shape[0]
+def _take_modes(first, stop, i, ring, points, phases, place, start, folded, columns):
+    n_m = columns.shape[1]
     k = first % points
     for m in range(first, stop):
-        phase = phases[m - first]
+        phase = phases[place, m - first]
         opposite = points - k if k > 0 else 0
-        columns[m, ring] = phase.conjugate() * modes[k]
-        columns[n_m - m, ring] = phase * modes[opposite]
+        columns[i, m, ring] = phase.conjugate() * folded[start + k]
+        columns[i, n_m - m, ring] = phase * folded[start + opposite]
         k = k + 1 if k + 1 < points else 0
 
 
 @kernel
-def _take_real_modes(first, stop, ring, points, phases, modes, columns):
+def _take_real_modes(first, stop, i, ring, points, phases, place, start, folded, columns):
     k = first % points
     for m in range(first, stop):
-        value = modes[points - k].conjugate() if 2 * k > points else modes[k]
-        columns[m, ring] = phases[m - first].conjugate() * value
+        value = folded[start + points - k].conjugate() if 2 * k > points else folded[start + k]
+        columns[i, m, ring] = phases[place, m - first].conjugate() * value
         k = k + 1 if k + 1 < points else 0
 
 
@@ -154,13 +159,13 @@ def fill_unfolded(folded, rings, sizes, phis, limits, starts, is_real, columns):
     for first in range(1, _largest(limits), _STRIDE):
         held[0] = held[1] = np.nan
         for r in range(rings.size):
-            stop = min(first + _STRIDE, limits[r])
-            place = _prepare_phases(first, phis[r], steps[r], held, phases)
+            stop, ring, points = min(first + _STRIDE, limits[r]), rings[r], sizes[r]
+            place = _prepare_phases(first, r, phis, steps, held, phases) if stop > first else 0
             for i in range(columns.shape[0]):
-                modes = folded[starts[i, r] :]
+                start = starts[i, r]
                 if is_real:
                     _take_real_modes(
-                        first, stop, rings[r], sizes[r], phases[place], modes, columns[i]
+                        first, stop, i, ring, points, phases, place, start, folded, columns
                     )
                 else:
-                    _take_modes(first, stop, rings[r], sizes[r], phases[place], modes, columns[i])
+                    _take_modes(first, stop, i, ring, points, phases, place, start, folded, columns)

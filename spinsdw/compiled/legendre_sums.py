@@ -106,21 +106,23 @@ def _fill_coefficients(m, count, series, mixers, c):
 @kernel
 def _store_block(first, start, n_rings, sums, cosine, factor, column):
     """Write both hemispheres of a block of rings into a column."""
-    total = column.size
-    for r in range(min(RINGS, n_rings - start)):
-        ring = start + r
-        x, size = cosine[ring], factor[ring]
+    count = min(RINGS, n_rings - start)
+    north = column[first + start : first + start + count]
+    south = column[column.size - first - start - count : column.size - first - start]
+    x, size = cosine[start : start + count], factor[start : start + count]
+    for r in range(count):
         even = complex(sums[r], sums[RINGS + r])
-        odd = x * complex(sums[2 * RINGS + r], sums[3 * RINGS + r])
-        column[first + ring] = size * (even + odd)
-        column[total - 1 - first - ring] = size * (even - odd)
+        odd = x[r] * complex(sums[2 * RINGS + r], sums[3 * RINGS + r])
+        north[r] = size[r] * (even + odd)
+        south[count - 1 - r] = size[r] * (even - odd)
 
 
 @kernel
 def _copy_state(state, start, u):
     for i in range(3):
+        given, copy = state[i, start : start + RINGS], u[i]
         for r in range(RINGS):
-            u[i, r] = state[i, start + r]
+            copy[r] = given[r]
 
 
 @kernel

@@ -187,15 +187,20 @@ def fill_start(norm, norm_power, powers, first, before, now, scale, power):
     powers: mantissas and exponents of sin(theta)^(M - |K|), then of (1 +- cos(theta))^|K|.
     Returns how many rings are in range.
     """
-    small = 0
+    # Short loops: each is one the compiler turns into vectors.
+    stop = first + now.size
+    mantissa, factor = powers[0, first:stop], powers[2, first:stop]
     for r in range(now.size):
-        value = norm * powers[0, first + r] * powers[2, first + r]
-        exponent = norm_power + powers[1, first + r] + powers[3, first + r]
-        now[r] = value
-        power[r] = exponent
+        now[r] = norm * mantissa[r] * factor[r]
+    exponent, more = powers[1, first:stop], powers[3, first:stop]
+    for r in range(now.size):
+        power[r] = norm_power + exponent[r] + more[r]
+    for r in range(now.size):
         before[r] = 0.0
         scale[r] = 0.0
-        small += 1 if abs(value) < _SMALLEST or exponent != 0.0 else 0
+    small = 0
+    for r in range(now.size):
+        small += int(abs(now[r]) < _SMALLEST) + int(power[r] != 0.0)
     return _fill_small_start(power, now, scale) if small > 0 else now.size
 
 
