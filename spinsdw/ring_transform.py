@@ -26,7 +26,7 @@ __all__ = ["HealpixTransform"]
 Array = np.ndarray[Any, Any]
 
 # Bytes of the Fourier columns of the maps that go through the sums together.
-_COLUMN_BYTES = 2**28
+_COLUMN_BYTES = 2**26
 
 
 @dataclass(frozen=True, eq=False)

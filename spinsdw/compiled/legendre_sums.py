@@ -58,11 +58,18 @@ def _prepare_order(
     prepare_powers(m, 0, is_new, rings, powers)
     norm, norm_power = signed_norm(m, 0, tables[1])
     norm *= math.sqrt((2.0 * m + 1.0) * (2.0 * m + 3.0))
-    for start in range(window[0], window[1], RINGS):
-        block = state[:, start : start + RINGS]
-        inside[start // RINGS] = fill_start(
-            norm, norm_power, powers, start, block[0], block[1], block[2], block[3]
-        )
+    low = window[0]
+    blocks = (window[1] - low + RINGS - 1) // RINGS
+    if blocks > 0:
+        part = state[:, low : low + blocks * RINGS]
+        total = fill_start(norm, norm_power, powers, low, part[0], part[1], part[2], part[3])
+        for block in range(blocks):
+            found = RINGS
+            if total < part.shape[1]:
+                found = 0
+                for r in range(block * RINGS, (block + 1) * RINGS):
+                    found += int(part[2, r] == 0.0)
+            inside[block] = found
     return count
 
 
@@ -199,7 +206,7 @@ def fill_mirrored_columns(
                         count,
                         4,
                         _LOOK,
-                        inside[start // RINGS],
+                        inside[(start - low) // RINGS],
                         recursion[0],
                         shift,
                         c,
@@ -299,7 +306,8 @@ def add_mirrored_to_harmonics(
             for side in range(sides if m > 0 else 1):
                 sums[: 4 * WIDTH * (count + PADDING)] = 0.0
                 column = columns[i, m if side == 0 else n_m - m]
-                for start in range(windows[0, m], windows[1, m], RINGS):
+                low, high = windows[0, m], windows[1, m]
+                for start in range(low, high, RINGS):
                     x, shift = _arguments(start, rings, recursion)
                     _copy_state(state, start, u)
                     _load_block(first_ring, start, padded - RINGS, column, rings[5], rings[6], g)
@@ -309,7 +317,7 @@ def add_mirrored_to_harmonics(
                         count,
                         4,
                         _LOOK,
-                        inside[start // RINGS],
+                        inside[(start - low) // RINGS],
                         recursion[0],
                         shift,
                         g,
