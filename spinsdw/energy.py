@@ -77,7 +77,7 @@ def _products(one: Array, other: Array, transform: SpinWaveletTransform, key: in
     if step == 1:
         orders = (*range(len(orders) // 2 + 1), *range(-(len(orders) // 2), 0))
     rows = one.reshape(-1, *transform.shapes[key]), other.reshape(-1, *transform.shapes[key])
-    found = np.empty(one.shape[:-2], dtype=one.dtype)
+    found = np.empty(one.shape[:-2], dtype=np.result_type(one, np.float64))
     products = found.reshape(len(rows[0]), len(orders))
     for product, first, second in zip(products, *rows, strict=True):
         maps = first.reshape(-1, *grid.shape)

@@ -177,3 +177,14 @@ def test_coefficients_must_be_the_transforms():
     both = transform.analysis_harmonic(random_flm(8, 2, batch=(2,)))
     with pytest.raises(ShapeError, match=r"have the batches \(\) and \(2,\)"):
         inner_product(transform, found, both)
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_single_precision_is_summed_in_double(real):
+    """|norm - norm of the rounded coefficients| stays at the roundings of single precision."""
+    flm = random_real_flm(16)
+    single = SpinWaveletTransform(16, 0, 3, real=real, dtype="complex64")
+    coefficients = single.analysis_harmonic(flm)
+    for found in (norm(single, coefficients), inner_product(single, coefficients, coefficients)):
+        assert found.dtype == (np.complex128 if np.iscomplexobj(found) else np.float64)
+    assert abs(norm(single, coefficients) / np.linalg.norm(flm) - 1) < 1e-7

@@ -48,7 +48,7 @@ def coefficients_to_healpix(
     -------
     ndarray, shape (..., directions, 12 * nside**2), complex128 (float64 if ``transform.real``)
         RING order, each orientation gamma_k a map; without the axis of directions for the scaling
-        part. Leading axes are the batch.
+        part. Leading axes are the batch. Of single precision for coefficients of that.
 
     Raises
     ------

@@ -169,11 +169,10 @@ class _Layout:
         transform = self.transform
         shape = transform.shapes["scaling"]
         checked = self.real_part(check_map(scaling, shape, real=False, name="f_scal"))
-        wavelets = {
-            j: self.restore(values, j) for j, values in zip(transform.scales, scales, strict=True)
-        }
-        parameters = transform.analysis_harmonic(np.zeros(transform.bandlimit**2)).parameters
-        return WaveletCoefficients(checked, wavelets, parameters)
+        arrays: dict[int | str, Array] = {"scaling": checked}
+        for j, values in zip(transform.scales, scales, strict=True):
+            arrays[j] = self.restore(values, j)
+        return transform.from_arrays(arrays)
 
 
 def _s2let_layout(transform: SpinWaveletTransform) -> _Layout:
