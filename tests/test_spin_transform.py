@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from tests.helpers import (
     IS_UNCOMPILED,
     assert_close,
     direct_map,
+    exact_small_d,
     needs_compiler,
     random_flm,
     random_like,
@@ -398,6 +401,78 @@ def test_analysis_undoes_synthesis_at_degree_4095(spin):
     found = transform.analysis(transform.synthesis(flm))
     assert relative_error(found, flm) <= 4096 * EPS
     assert np.max(np.abs(found - flm)) < 1e-11
+
+
+def small_d_near_pole(el, m, n, angle):
+    """d^l_mn of a small angle: the sum of `exact_small_d`, whose terms soon fall with k.
+
+    Its first factor is a root of products of |m - n| integers, without factorials.
+    """
+    if m < n:
+        return (-1.0) ** (m - n) * small_d_near_pole(el, n, m, angle)
+    sine2 = math.sin(angle / 2) ** 2
+    rising = math.prod(range(el + n + 1, el + m + 1)) * math.prod(range(el - m + 1, el - n + 1))
+    cosine = math.exp((2 * el + n - m) / 2 * math.log1p(-sine2))
+    term = math.sqrt(rising) / math.factorial(m - n) * math.sqrt(sine2) ** (m - n) * cosine
+    terms = [(-1.0) ** (m - n) * term]
+    for k in range(min(el + n, el - m)):
+        ratio = (el + n - k) * (el - m - k) / ((k + 1) * (m - n + k + 1))
+        terms.append(-terms[-1] * ratio * sine2 / (1 - sine2))
+        if abs(terms[-1]) < EPS**2 * abs(terms[0]):
+            break
+    return math.fsum(terms)
+
+
+@needs_compiler
+@pytest.mark.parametrize("spin", [2, -8])
+@pytest.mark.parametrize("bandlimit", [20, 128, pytest.param(4096, marks=pytest.mark.slow)])
+def test_rings_next_to_the_poles_hold_the_highest_degree(bandlimit, spin):
+    """F_m = (-1)^s sqrt((2l+1)/4pi) f_lm d^l_{m,-s}; d^l_mn(pi-t) = (-1)^(l+m) d^l_{m,-n}(t)."""
+    transform = SpinHarmonicTransform(bandlimit, spin)
+    el, orders = bandlimit - 1, np.arange(-9, 10)
+    flm = np.zeros(bandlimit**2, dtype=complex)
+    chosen = random_like(np.empty(orders.size, dtype=complex))
+    flm[el**2 + el + orders] = chosen
+    rings = np.array([0, 1, 2, -4, -3, -2])
+    columns = np.fft.fft(transform.synthesis(flm)[rings], axis=1)[:, orders] / (2 * el + 1)
+    factor = (-1.0) ** spin * np.sqrt((2 * el + 1) / (4 * np.pi)) * chosen
+    steps = np.where(rings >= 0, 2 * rings + 1, -2 * (rings + 1)) * (np.pi / (2 * el + 1))
+    desired = np.array(
+        [
+            [
+                small_d_near_pole(el, m, -spin, angle)
+                if ring >= 0
+                else (-1.0) ** (el + m) * small_d_near_pole(el, m, spin, angle)
+                for m in orders.tolist()
+            ]
+            for ring, angle in zip(rings, steps.tolist(), strict=True)
+        ]
+    )
+    # Next to a pole the recursion's own roundings add up twice: a random walk's integral.
+    assert_close(columns, factor * desired, ulps=4 * bandlimit**1.5)
+
+
+@needs_compiler
+@pytest.mark.parametrize("spin", [2, -8])
+@pytest.mark.parametrize("bandlimit", [20, 128, pytest.param(4096, marks=pytest.mark.slow)])
+def test_orders_close_to_the_degree_hold_on_every_ring(bandlimit, spin):
+    """As above for m = +-(l - k), k < 5, where d has few terms, and none but near the equator."""
+    transform = SpinHarmonicTransform(bandlimit, spin)
+    el = bandlimit - 1
+    orders = np.concatenate([el - np.arange(5), np.arange(5) - el])
+    flm = np.zeros(bandlimit**2, dtype=complex)
+    chosen = random_like(np.empty(orders.size, dtype=complex))
+    flm[el**2 + el + orders] = chosen
+    rings = np.unique(np.linspace(0, bandlimit - 2, 9).astype(int)[[0, 1, 3, 4, 5, 7]])
+    columns = np.fft.fft(transform.synthesis(flm)[rings], axis=1)[:, orders] / (2 * el + 1)
+    factor = (-1.0) ** spin * np.sqrt((2 * el + 1) / (4 * np.pi)) * chosen
+    half = transform.sampling.colatitudes[rings] / 2
+    cosines = [
+        1 - 2 * Fraction(sine) ** 2 if sine < 0.75 else 2 * Fraction(cosine) ** 2 - 1
+        for sine, cosine in zip(np.sin(half).tolist(), np.cos(half).tolist(), strict=True)
+    ]
+    desired = [[exact_small_d(el, m, -spin, x) for m in orders.tolist()] for x in cosines]
+    assert_close(columns, factor * np.array(desired), ulps=16 * bandlimit)
 
 
 @pytest.mark.slow

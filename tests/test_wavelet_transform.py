@@ -674,10 +674,13 @@ def test_dtypes_and_layouts_do_not_matter():
 
 @pytest.mark.slow
 @needs_compiler
-@pytest.mark.parametrize(("bandlimit", "directions"), [(1024, 3), (2048, 1)])
-def test_synthesis_undoes_analysis_at_high_degree(bandlimit, directions):
-    transform = SpinWaveletTransform(bandlimit, 2, directions)
-    flm = random_flm(bandlimit, 2)
+@pytest.mark.parametrize(
+    ("bandlimit", "spin", "directions"),
+    [(1024, 2, 3), (1024, 2, 9), (1024, -8, 8), (2048, 2, 1), (4096, 2, 1)],
+)
+def test_synthesis_undoes_analysis_at_high_degree(bandlimit, spin, directions):
+    transform = SpinWaveletTransform(bandlimit, spin, directions)
+    flm = random_flm(bandlimit, spin)
     found = transform.synthesis_harmonic(transform.analysis_harmonic(flm))
     assert relative_error(found, flm) <= bandlimit * EPS
     assert np.max(np.abs(found - flm)) < 1e-11
