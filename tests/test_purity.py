@@ -178,6 +178,12 @@ def test_skies_of_one_kind_hold_what_they_say(skies):
     assert abs(q.std() * pixel / 2.0 - 1) < 5 / np.sqrt(2 * q.size)
 
 
+def test_skies_of_another_beam_are_not_mistaken_for_these(skies):
+    narrower = dataclasses.replace(TINY, beam=TINY.beam / 2)
+    q, _ = Skies("cmb", narrower, skies.folder).qu("E", 200)
+    assert np.any(q != skies.qu("E", 200)[0])
+
+
 def test_seeds_of_tuning_and_test_are_disjoint():
     for setting in SETTINGS.values():
         assert not set(setting.tuning_seeds) & set(setting.test_seeds)

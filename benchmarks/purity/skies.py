@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import tempfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,10 +97,20 @@ class Skies:
     folder: Path | None = None
     keep: bool = True
 
-    @property
+    @functools.cached_property
     def sky_model(self) -> SkyModel:
         """Spectra and noise."""
         return MODELS[self.model]()
+
+    @functools.cached_property
+    def _digest(self) -> str:
+        """Tells skies of other spectra, noise or resolution apart in one folder."""
+        model, setting = self.sky_model, self.setting
+        numbers = [model.noise, setting.nside, setting.bandlimit, setting.beam]
+        digest = zlib.crc32(np.array(numbers).tobytes())
+        for kind, spectra in model.spectra.items():
+            digest = zlib.crc32(kind.encode() + np.array(spectra).tobytes(), digest)
+        return f"{digest:08x}"
 
     def qu(self, kind: str, seed: int) -> tuple[Array, Array]:
         """Return Q and U of one of `KINDS`, or of the B alone of "full": "full B"."""
@@ -142,7 +154,7 @@ class Skies:
         if not self.keep:
             return make()
         folder = self.folder or Path(tempfile.gettempdir()) / f"spinsdw-purity-{os.getuid()}"
-        name = f"{self.model}-{self.setting.name}-{spinsdw.__version__}-{kind}-{seed}-{what}.npy"
+        name = f"{self.model}-{self._digest}-{spinsdw.__version__}-{kind}-{seed}-{what}.npy"
         path = folder / name
         if not path.is_file():
             folder.mkdir(parents=True, exist_ok=True)
