@@ -120,8 +120,8 @@ def test_results_survive_json():
     again = Result.from_json(json.loads(json.dumps(found.to_json())))
     assert (again.method, again.seeds, again.scales) == ("pseudo", (200,), TINY.scales)
     for name, values in found.sums.items():
-        np.testing.assert_allclose(again.sums[name], values, rtol=1e-6, atol=0)
-    np.testing.assert_allclose(again.f_ret(1e-2), found.f_ret(1e-2), rtol=0, atol=1e-5)
+        np.testing.assert_allclose(again.sums[name], values, rtol=1e-4, atol=0)
+    np.testing.assert_allclose(again.f_ret(1e-2), found.f_ret(1e-2), rtol=0, atol=1e-4)
 
 
 def test_a_method_that_keeps_nothing_retains_nothing():

@@ -30,7 +30,7 @@ STYLES = {
     "hybrid": ("#0072B2", "-", "o"),
     "wiener": ("black", ":", "+"),
 }
-FLOOR = 1e-12
+FLOOR = 1e-9
 
 
 def _style(label: str) -> dict:

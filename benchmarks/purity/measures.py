@@ -175,7 +175,7 @@ class Result:
         return getattr(self, measure)[:, DISTANCES.index(distance)]
 
     def to_json(self) -> dict[str, Any]:
-        """Return what json can write: sums with seven digits."""
+        """Return what json can write: sums with five digits."""
         record = asdict(self)
         record["shares"] = _digits(self.shares)
         record["sums"] = {name: _digits(total) for name, total in self.sums.items()}
@@ -194,4 +194,4 @@ class Result:
 
 
 def _digits(values: Array) -> list:
-    return np.vectorize(lambda value: float(f"{value:.7g}"))(values).tolist()
+    return np.vectorize(lambda value: float(f"{value:.5g}"))(values).tolist()
