@@ -54,7 +54,7 @@ tutorials: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	@$(BIN)/python benchmarks/smoke.py
-	@$(BIN)/python -m benchmarks.purity --setting tiny --folder build/purity
+	@$(BIN)/python -m benchmarks.purity --setting tiny --surveys B --folder build/purity
 
 clean:
 	rm -rf $(VENV) build dist output *.egg-info docs/_build docs/generated docs/gallery \

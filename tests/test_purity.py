@@ -14,6 +14,7 @@ pytest.importorskip("matplotlib")
 from benchmarks.purity import DISTANCES, SETTINGS, SURVEYS, Result, SeparatorBands, Skies, judge
 from benchmarks.purity.__main__ import main as purity_main
 from benchmarks.purity.bands import evaluated_bands, synthesised_bands
+from benchmarks.purity.catalogue import catalogue
 from benchmarks.purity.families import families
 from benchmarks.purity.figures import save_figures
 from benchmarks.purity.measures import Regions
@@ -25,6 +26,7 @@ from benchmarks.purity.skies import KINDS
 from benchmarks.purity.surveys import survey_mask
 from spinsdw.masks import distance_to_edge, fill_holes
 from spinsdw.separation import Pseudo
+from spinsdw.separation.registry import METHODS
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import assert_close, random_real_flm
 
@@ -122,6 +124,16 @@ def test_results_survive_json():
     for name, values in found.sums.items():
         np.testing.assert_allclose(again.sums[name], values, rtol=1e-4, atol=0)
     np.testing.assert_allclose(again.f_ret(1e-2), found.f_ret(1e-2), rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_of_the_package_can_be_judged(name):
+    """By its name, in the widest of its variants: B is found somewhere, and E is mostly not."""
+    label, make = catalogue(name)[-1]
+    found = judge(make(survey_mask("B", TINY.nside), TINY), "B", TINY, (200,), label=label)
+    assert found.method == name
+    assert np.nanmax(found.f_eff) > 0
+    assert np.nanmin(found.r_leak) < 1
 
 
 def test_a_method_that_keeps_nothing_retains_nothing():

@@ -6,8 +6,6 @@ import argparse
 import time
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.purity.catalogue import catalogue
 from benchmarks.purity.judge import judge
 from benchmarks.purity.measures import Result
@@ -15,6 +13,7 @@ from benchmarks.purity.results import FOLDER, add_result
 from benchmarks.purity.settings import SETTINGS
 from benchmarks.purity.skies import MODELS
 from benchmarks.purity.surveys import SURVEYS, survey_mask
+from spinsdw.errors import ParameterError
 from spinsdw.separation.registry import METHODS
 
 __all__ = ["main"]
@@ -58,16 +57,21 @@ def main() -> None:
     choices = _arguments()
     setting = SETTINGS[choices.setting]
     seeds = range(*choices.seeds) if choices.seeds else setting.test_seeds
+    options = {"model": choices.model, "linearity": choices.linearity, "batch": choices.batch}
     for survey in choices.surveys:
         mask = survey_mask(survey, setting.nside)
         for name in choices.methods:
-            for label, make in catalogue(name, choices.model):
+            variants = catalogue(name, choices.model)
+            for label, make in variants:
                 start = time.perf_counter()
-                options = {"model": choices.model, "linearity": choices.linearity}
-                method = make(np.asarray(mask), setting)
-                result = judge(
-                    method, survey, setting, seeds, label=label, batch=choices.batch, **options
-                )
+                try:
+                    method = make(mask, setting)
+                    result = judge(method, survey, setting, seeds, label=label, **options)
+                except ParameterError as error:
+                    if len(variants) == 1:
+                        raise
+                    print(f"{label}, {survey}: one choice left out: {error}\n")
+                    continue
                 add_result(result, choices.folder)
                 took = time.perf_counter() - start
                 print(f"{summary(result)}, {took:.0f} s in all\n", flush=True)
