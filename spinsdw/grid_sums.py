@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from spinsdw.fourier import fill_maps, fill_maps_columns
+from spinsdw.mirror_engine import MirrorEngine
 from spinsdw.parallel import run_tasks, threads_for
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
@@ -40,6 +41,12 @@ def engine_of(sampling: Sampling) -> RingEngine:
     if sampling.is_symmetric:
         return RingEngine(sampling.bandlimit, rings[: (rings.size + 1) // 2], symmetric=True)
     return RingEngine(sampling.bandlimit, rings)
+
+
+@functools.lru_cache(maxsize=64)
+def _mirror_engine(sampling: Sampling, order: int) -> MirrorEngine:
+    north = sampling.colatitudes[: (sampling.n_rings + 1) // 2]
+    return MirrorEngine(sampling.bandlimit, north, order)
 
 
 def fill_negative_orders(flm: Array) -> None:
@@ -136,6 +143,32 @@ class GridSums:
             columns[:, self.sampling.bandlimit] = 0.0
         return columns
 
+    @property
+    def _mirror(self) -> MirrorEngine | None:
+        """The faster sums of a single order on rings that mirror each other."""
+        if len(self.orders) > 1 or not self.sampling.is_symmetric:
+            return None
+        return _mirror_engine(self.sampling, self.orders[0])
+
+    def _fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, columns: Array) -> None:
+        from spinsdw.compiled.columns import clear_outer_rings
+
+        mirror = self._mirror
+        if mirror is None:
+            engine_of(self.sampling).fill_columns(flm, sums, mixing, columns)
+            return
+        mirror.fill_columns(flm, sums, columns[:1])
+        clear_outer_rings(mirror.limits, sums.sides, columns[0])
+        if not np.array_equal(mixing, [[1.0]]):
+            self._mix(mixing, columns)
+
+    def _add_columns(self, columns: Array, sums: OrderSums, out: Array) -> None:
+        mirror = self._mirror
+        if mirror is None:
+            engine_of(self.sampling).add_to_harmonics(columns, sums, out)
+        else:
+            mirror.add_to_harmonics(columns[:1], sums, out)
+
     def _share(self, call: Callable[[int, int], None], size: int, step: int) -> None:
         tasks = [
             functools.partial(call, first, min(first + step, size))
@@ -168,16 +201,16 @@ class GridSums:
         ``out`` where it is given.
         """
         columns = self._columns()
-        engine, sums = engine_of(self.sampling), self._order_sums(weights, lowest)
+        sums = self._order_sums(weights, lowest)
         if quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
-            engine.fill_columns(flm, sums, identity, columns)
+            self._fill_columns(flm, sums, identity, columns)
             self.sampling.weigh_columns(
                 columns, self.orders, mixing=identity, threads=self._threads
             )
             self._mix(self.mixing, columns)
         else:
-            engine.fill_columns(flm, sums, self.mixing, columns)
+            self._fill_columns(flm, sums, self.mixing, columns)
         outputs = self.mixing.shape[0]
         maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
         self._share_rings(lambda a, b: fill_maps(columns[:outputs, :, a:b], maps[:, a:b]), outputs)
@@ -208,4 +241,4 @@ class GridSums:
             )
         elif not np.array_equal(unmixing, [[1.0]]):
             self._mix(unmixing, columns)
-        engine_of(self.sampling).add_to_harmonics(columns, self._order_sums(weights, lowest), out)
+        self._add_columns(columns, self._order_sums(weights, lowest), out)

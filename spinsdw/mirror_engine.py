@@ -23,6 +23,9 @@ Array = np.ndarray[Any, Any]
 # Rings with sin(theta) below |n| times this are next to a pole: the division by sin(theta)^|n|
 # would enlarge rounding errors by more than 16 (n = 1), 64 (2) .. 256 (4 and 8).
 _LEAST_SINE = 1 / 16
+# Steps of two degrees gather more rounding next to a pole, up to 16 times as much at L = 1024: so
+# for n = 0 the rule of n = 1 holds, and for any n, L sin(theta) is not below this.
+_LEAST_PHASE = 8.0
 _LARGEST_ORDER = 8
 
 
@@ -60,7 +63,8 @@ class MirrorEngine:
         size = abs(self.order)
         if size > _LARGEST_ORDER:
             return self.colatitudes.size
-        return int(np.count_nonzero(np.sin(self.colatitudes) < size * _LEAST_SINE))
+        least = max(max(size, 1) * _LEAST_SINE, _LEAST_PHASE / self.bandlimit)
+        return int(np.count_nonzero(np.sin(self.colatitudes) < least))
 
     @functools.cached_property
     def _cap(self) -> RingEngine:

@@ -107,7 +107,8 @@ def test_every_bandlimit_round_trips(first, sampling):
         transform = SpinHarmonicTransform(bandlimit, sampling=sampling, real=True)
         flm = random_real_flm(bandlimit)
         found = transform.analysis(transform.synthesis(flm))
-        assert_close(found, flm, ulps=tolerance(bandlimit))
+        # Mirrored rings take steps of two degrees, which gather more rounding at the equator.
+        assert_close(found, flm, ulps=tolerance(bandlimit) * (1 if sampling == "mw" else 2))
 
 
 @pytest.mark.parametrize("sampling", GRIDS)

@@ -9,7 +9,7 @@ import numpy as np
 
 from spinsdw.compiled.jit import kernel
 
-__all__ = ["fill_circles", "fold_circles", "mix_columns"]
+__all__ = ["clear_outer_rings", "fill_circles", "fold_circles", "mix_columns"]
 
 
 @kernel
@@ -26,6 +26,18 @@ def mix_columns(mixing, first_m, stop_m, columns):
                 for k in range(n_in):
                     value += mixing[i, k] * values[k]
                 columns[i, m, r] = value
+
+
+@kernel
+def clear_outer_rings(limits, sides, columns):
+    """columns[+-m, ring] <- 0 for m >= limits[ring], and for its mirror image; -m at n_m - m."""
+    n_m, n_rings = columns.shape
+    for i in range(n_m):
+        m = i if sides == 1 else min(i, n_m - i)
+        for r in range(limits.size):
+            if limits[r] <= m:
+                columns[i, r] = 0.0
+                columns[i, n_rings - 1 - r] = 0.0
 
 
 @kernel
