@@ -39,7 +39,7 @@ class Pure:
     ----------
     taper : float, default 2.0
         Width of the taper of a scale times the degree at which its wavelets peak, in radians.
-    samples : float, default 6.5
+    samples : float, default 6.0
         Least width of a taper, in distances between samples: a narrower one has more structure than
         they can integrate, and lets E through.
     widths : mapping of (int or "scaling") to float, optional
@@ -56,7 +56,7 @@ class Pure:
     Notes
     -----
     The maps are not divided by the masks: band j is that of N^-1 M_j N E, which is about M_j E
-    where the mask changes slowly, and ``weights`` says what M_j is.
+    where the mask changes slowly, and ``weights`` says what M_j is. Inverse noise is not used.
 
     Examples
     --------
@@ -66,13 +66,13 @@ class Pure:
 
     name: ClassVar[str] = "pure"
     taper: float = 2.0
-    samples: float = 6.5
+    samples: float = 6.0
     widths: Mapping[int | str, float] | None = None
     largest_share: float = 0.8
 
     def __post_init__(self) -> None:
         check_positive(self.taper, "taper", "2.0 keeps most of the sky")
-        check_positive(self.samples, "samples", "6.5 suits maps with a beam")
+        check_positive(self.samples, "samples", "6.0 suits maps with a beam")
         for key, width in (self.widths or {}).items():
             check_positive(width, f"widths[{key!r}]", "np.radians(2) is a taper of 2 degrees")
         check_positive(self.largest_share, "largest_share", "0.8 is usual")

@@ -89,7 +89,7 @@ def test_weights_are_the_masks_of_the_scales(pure_maps):
     )
     spacing = np.sqrt(np.pi / 3) / NSIDE
     for j in (3, 4, 5):
-        width = min(max(2.0 / 2**j, 6.5 * spacing), 0.8)
+        width = min(max(2.0 / 2**j, 6.0 * spacing), 0.8)
         weights = maps.weights[j]
         assert weights.min() >= 0
         assert weights.max() <= 1
@@ -113,7 +113,7 @@ def test_coefficients_are_those_of_the_masked_derivatives():
     transform = separator._transform("mw")
     p = healpix_cap() * (q[0] + 1j * u[0])
     for j, degree in ((3, 8), (4, 16)):
-        width = max(3.0 / degree, 6.5 * sky.spacing)
+        width = max(3.0 / degree, 6.0 * sky.spacing)
         plm = pure_harmonics(sky, masks.of_width(width), p, L)
         expected = transform.analysis_harmonic(plm)[j]
         # Low degrees are summed without the iteration that all degrees together get.
