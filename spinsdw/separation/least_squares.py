@@ -208,9 +208,10 @@ class Observation:
         return self.sky.adjoint_polarisation_map(weighted)
 
 
-def _real_dot(left: Array, right: Array) -> float:
-    """Re <left, right>, the inner product of the real degrees of freedom."""
-    return float(np.vdot(left, right).real)
+def _power(left: Array, right: Array) -> Array:
+    """Re <left, right> of each map of a stack: the inner product of the real degrees of freedom."""
+    products = left.real * right.real + left.imag * right.imag
+    return np.asarray(products.reshape(len(products), -1).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,9 +241,9 @@ class LeastSquares:
     >>> from spinsdw.separation.skies import GridSky
     >>> sky, flat = GridSky(MW(8)), np.ones(8)
     >>> observation = Observation(sky, np.ones((8, 15)), 1e-6)
-    >>> p = sky.polarisation_map(np.arange(64.0))
-    >>> plm, convergence = LeastSquares(observation, EBPrior(flat, flat)).solve(p)
-    >>> bool(np.allclose(plm[4:], np.arange(64.0)[4:])), convergence.converged
+    >>> p = sky.polarisation_map(np.arange(64.0)[None])
+    >>> plm, (convergence,) = LeastSquares(observation, EBPrior(flat, flat)).solve(p)
+    >>> bool(np.allclose(plm[0, 4:], np.arange(64.0)[4:])), convergence.converged
     (True, True)
     """
 
@@ -268,51 +269,65 @@ class LeastSquares:
     def _preconditioner(self) -> _SplitFilter:
         return self.prior.preconditioner(self.observation.precision)
 
-    def solve(self, p: Array) -> tuple[Array, Convergence]:
-        """Return the coefficients p_lm that fit a map best, and how the fit went.
+    def solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:
+        """Return the coefficients p_lm that fit each map of a stack best, and how the fits went.
 
         Parameters
         ----------
-        p : ndarray, shape of a map, complex128
+        p : ndarray, shape (batch, *map), complex128
             P = Q + iU; finite where the weights are not 0, and zero or finite elsewhere.
 
         Returns
         -------
-        plm : ndarray, shape (bandlimit**2,), complex128
+        plm : ndarray, shape (batch, bandlimit**2), complex128
             -(E_lm + i B_lm); `spinsdw.harmonics.spin_to_eb` splits it.
-        convergence : Convergence
-            Steps, residuals and the sum minimised.
+        convergence : tuple of Convergence
+            Steps, residuals and the sum minimised, for each map.
         """
         return self.solve_whitened(self.observation.whiten(p))
 
-    def solve_whitened(self, values: Array) -> tuple[Array, Convergence]:
-        """Fit values in units of the noise, as `Observation.whiten` makes them."""
+    def solve_whitened(self, values: Array) -> tuple[Array, tuple[Convergence, ...]]:
+        """Fit stacks of values in units of the noise, as `Observation.whiten` makes them."""
         root, observation = self.prior.root, self.observation
         remainder = values.astype(np.complex128)
         gradient = root(observation.adjoint_observe(remainder))
         direction = self._preconditioner(gradient)
         x = np.zeros_like(direction)
-        power = start = _real_dot(gradient, direction)
-        powers, objective = [start], [_real_dot(remainder, remainder)]
-        while len(powers) <= self.max_iterations and power > self.tolerance**2 * start:
+        power = start = _power(gradient, direction)
+        powers, objective = [start], [_power(remainder, remainder)]
+        while len(powers) <= self.max_iterations:
+            # A map that has converged stands still: its result does not depend on the stack.
+            active = power > self.tolerance**2 * start
+            if not active.any():
+                break
             change = observation.observe(root(direction))
-            step = power / (_real_dot(change, change) + _real_dot(direction, direction))
-            x += step * direction
-            remainder -= step * change
+            curvature = _power(change, change) + _power(direction, direction)
+            step = np.divide(power, curvature, out=np.zeros_like(power), where=active)
+            x += step[:, None] * direction
+            remainder -= _along(step, change) * change
             gradient = root(observation.adjoint_observe(remainder)) - x
             ahead = self._preconditioner(gradient)
-            previous, power = power, _real_dot(gradient, ahead)
-            direction *= power / previous
+            previous, power = power, np.where(active, _power(gradient, ahead), power)
+            ratio = np.divide(power, previous, out=np.zeros_like(power), where=previous > 0)
+            direction *= ratio[:, None]
             direction += ahead
             powers.append(power)
-            objective.append(_real_dot(remainder, remainder) + _real_dot(x, x))
-        # A map of zeros is fitted by zeros, without a step.
-        residuals = np.sqrt(np.array(powers) / (start if start > 0 else 1.0))
-        converged = bool(power <= self.tolerance**2 * start)
-        history = Convergence(len(powers) - 1, residuals, np.array(objective), converged)
-        return root(x), history
+            objective.append(_power(remainder, remainder) + _power(x, x))
+        return root(x), self._histories(np.array(powers), np.array(objective))
 
-    def solve_all(self, maps: Array) -> tuple[Array, tuple[Convergence, ...]]:
-        """Fit every map of a stack, shape (batch, map); coefficients and one report for each."""
-        fits = [self.solve(p) for p in maps]
-        return np.array([plm for plm, _ in fits]), tuple(history for _, history in fits)
+    def _histories(self, powers: Array, objective: Array) -> tuple[Convergence, ...]:
+        """Tell how each map's fit went: columns of both arrays, one row a step."""
+        found = []
+        for steps, sums in zip(powers.T, objective.T, strict=True):
+            # A map of zeros is fitted by zeros, without a step.
+            residuals = np.sqrt(steps / (steps[0] if steps[0] > 0 else 1.0))
+            above = np.flatnonzero(residuals > self.tolerance)
+            taken = min(int(above[-1]) + 1 if above.size else 0, steps.size - 1)
+            converged = bool(residuals[taken] <= self.tolerance)
+            found.append(Convergence(taken, residuals[: taken + 1], sums[: taken + 1], converged))
+        return tuple(found)
+
+
+def _along(factors: Array, values: Array) -> Array:
+    """Give one factor for each map of a stack the axes of the stack."""
+    return factors.reshape(-1, *(1,) * (values.ndim - 1))
