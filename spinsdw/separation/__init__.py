@@ -7,10 +7,21 @@ or its name, as ``method``.
 from __future__ import annotations
 
 from spinsdw.separation.harmonic_pure import HarmonicPure
+from spinsdw.separation.hybrid import Hybrid
 from spinsdw.separation.masked import Masked
 from spinsdw.separation.needlets import SpinNeedlets
+from spinsdw.separation.projection import Projection
 from spinsdw.separation.pseudo import Pseudo
 from spinsdw.separation.pure import Pure
 from spinsdw.separation.recycling import Recycling
 
-__all__ = ["HarmonicPure", "Masked", "Pseudo", "Pure", "Recycling", "SpinNeedlets"]
+__all__ = [
+    "HarmonicPure",
+    "Hybrid",
+    "Masked",
+    "Projection",
+    "Pseudo",
+    "Pure",
+    "Recycling",
+    "SpinNeedlets",
+]

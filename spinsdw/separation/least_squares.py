@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -228,6 +229,9 @@ class LeastSquares:
         The most steps to take; each costs one synthesis and its adjoint.
     tolerance : float, default 1e-6
         The fit stops when the preconditioned gradient has fallen by this factor; 0 never stops it.
+    preconditioner : callable, optional
+        Stacks of x to stacks of x: symmetric, positive and near the inverse of the normal
+        equations; by default `EBPrior.preconditioner` for the mean weight.
 
     Raises
     ------
@@ -251,6 +255,7 @@ class LeastSquares:
     prior: EBPrior
     max_iterations: int = 25
     tolerance: float = 1e-6
+    preconditioner: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         remedy = "25 suit an E-projection"
@@ -266,7 +271,9 @@ class LeastSquares:
             raise ParameterError(msg)
 
     @functools.cached_property
-    def _preconditioner(self) -> _SplitFilter:
+    def _preconditioner(self) -> Callable[[Array], Array]:
+        if self.preconditioner is not None:
+            return self.preconditioner
         return self.prior.preconditioner(self.observation.precision)
 
     def solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from spinsdw.errors import ParameterError
 from spinsdw.separation.harmonic_pure import HarmonicPure
+from spinsdw.separation.hybrid import Hybrid
 from spinsdw.separation.masked import Masked
 from spinsdw.separation.method import Method
 from spinsdw.separation.needlets import SpinNeedlets
+from spinsdw.separation.projection import Projection
 from spinsdw.separation.pseudo import Pseudo
 from spinsdw.separation.pure import Pure
 from spinsdw.separation.recycling import Recycling
@@ -15,7 +17,17 @@ from spinsdw.separation.report import check_choice
 __all__ = ["METHODS", "resolve_method"]
 
 METHODS: dict[str, type[Method]] = {
-    kind.name: kind for kind in (Masked, Pseudo, Pure, HarmonicPure, Recycling, SpinNeedlets)
+    kind.name: kind
+    for kind in (
+        Hybrid,
+        Projection,
+        Pure,
+        Pseudo,
+        Masked,
+        Recycling,
+        HarmonicPure,
+        SpinNeedlets,
+    )
 }
 
 
