@@ -19,7 +19,16 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 ORDERINGS, POLCONVS = ("RING", "NESTED"), ("COSMO", "IAU")
 # The choices of EBSeparator, which is too heavy to be asked for --help; a test holds them equal.
-METHODS = ("masked", "pseudo", "pure", "harmonic-pure", "recycling", "needlets")
+METHODS = (
+    "hybrid",
+    "projection",
+    "pure",
+    "pseudo",
+    "masked",
+    "recycling",
+    "harmonic-pure",
+    "needlets",
+)
 OUTPUTS = ("fields", "derivatives", "potentials")
 SYNCHROTRON = "WMAP nine-year synchrotron at 23 GHz: a Galactic foreground, not the CMB."
 

@@ -16,9 +16,10 @@ import numpy as np
 from spinsdw.harmonics import eb_to_spin
 from spinsdw.sampling import Sampling
 from spinsdw.separation.least_squares import EBPrior
+from spinsdw.separation.survey import Survey
 from spinsdw.simulation import gaussian_flm
 
-__all__ = ["ShareBins", "draw_fields", "position_areas"]
+__all__ = ["ShareBins", "draw_fields", "draw_white", "position_areas"]
 
 Array = np.ndarray[Any, Any]
 
@@ -37,6 +38,13 @@ def draw_fields(prior: EBPrior, count: int, seed: int) -> tuple[Array, Array]:
     ]
     none = np.zeros_like(draws[0])
     return eb_to_spin(draws[0], none), eb_to_spin(none, draws[1])
+
+
+def draw_white(survey: Survey, count: int, seed: int) -> Array:
+    """Return coefficients p_lm of white noise in Q and U, shape (count, L^2)."""
+    flat = np.ones(survey.bandlimit)
+    flat[:2] = 0.0
+    return sum(draw_fields(EBPrior(flat, flat), count, seed + 1), start=np.zeros(()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +90,13 @@ class ShareBins:
         ranges[-1] = ranges[-1][0], last
         return ranges
 
+    def areas_of(self, inside: Array) -> Array:
+        """Return the areas of the coefficients of a bin."""
+        return np.asarray(np.broadcast_to(self.areas, self.share.shape)[inside])
+
     def mean(self, values: Array, inside: Array) -> float:
         """Return the mean over a bin of a stack of values, weighted by area."""
-        areas = np.broadcast_to(self.areas, self.share.shape)[inside]
+        areas = self.areas_of(inside)
         return float((values[:, inside] @ areas).sum() / (areas.sum() * len(values)))
 
 

@@ -187,17 +187,20 @@ class Observation:
 
     @functools.cached_property
     def _root(self) -> Array:
-        return np.sqrt(self.weights) / self.noise_level
+        return np.sqrt(self.weights * self.sky.areas) / self.noise_level
 
     @functools.cached_property
     def precision(self) -> float:
         """Mean over the sphere of the inverse noise power, <W> / n^2."""
-        mean = float(self.sky.integrals(self.weights, 1)[0].real / math.sqrt(4 * math.pi))
-        return mean / self.noise_level**2
+        return float(np.sum(self._root**2) / (4 * math.pi))
+
+    def weight_harmonics(self, bandlimit: int) -> Array:
+        """Return the coefficients of the inverse noise power W / n^2 below a bandlimit, by sums."""
+        return self.sky.area_sums(self.weights, bandlimit) / self.noise_level**2
 
     def whiten(self, p: Array) -> Array:
-        """Return a map in units of the noise; the sum of squares is its integral."""
-        return self.sky.coordinates(self._root * p)
+        """Return a map in units of the noise; the sum of squares stands for its integral."""
+        return np.asarray(self._root * p)
 
     def observe(self, plm: Array) -> Array:
         """Return what is seen of coefficients, in units of the noise."""
@@ -205,8 +208,7 @@ class Observation:
 
     def adjoint_observe(self, values: Array) -> Array:
         """Apply the adjoint of `observe`."""
-        weighted = self._root * self.sky.adjoint_coordinates(values)
-        return self.sky.adjoint_polarisation_map(weighted)
+        return self.sky.adjoint_polarisation_map(self._root * values)
 
 
 def _power(left: Array, right: Array) -> Array:

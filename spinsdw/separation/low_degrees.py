@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from spinsdw.harmonics import resize
-from spinsdw.ring_transform import HealpixTransform
 from spinsdw.separation.least_squares import EBPrior, Observation
+from spinsdw.spin_transform import SpinHarmonicTransform
 
 __all__ = ["LowDegreeBlock"]
 
@@ -58,9 +58,9 @@ class LowDegreeBlock:
         return self.prior.preconditioner(self.observation.precision)
 
     @functools.cached_property
-    def _factor(self) -> tuple[Array, bool]:
-        """Cholesky factor of the matrix, for the real and imaginary parts of p_lm, l >= 2."""
-        from scipy.linalg import cho_factor
+    def _inverse(self) -> Array:
+        """Inverse of the matrix, for the real and imaginary parts of p_lm, l >= 2."""
+        from scipy.linalg import eigh
 
         size, first = self._size, 4
         prior = EBPrior(self.prior.e_spectrum[:size], self.prior.b_spectrum[:size])
@@ -74,31 +74,29 @@ class LowDegreeBlock:
             matrix[rows] = np.concatenate(
                 [changed.real[:, first:], changed.imag[:, first:]], axis=1
             )
-        return cho_factor((matrix + matrix.T) / 2, lower=True, overwrite_a=True)
+        values, vectors = eigh((matrix + matrix.T) / 2, overwrite_a=True)
+        # 1 + a positive operator: what is below 1 comes from the sums over samples.
+        return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T)
 
     def _weigher(self, size: int) -> Callable[[Array], Array]:
-        """Return Y^H W Y / n^2 for degrees below ``size``, by sums over coarse pixels."""
-        seen = self.observation
-        nside = 8
-        # Products of degree 4 (size - 1) at most are integrated: sums are good to 3 nside or so.
-        while 3 * nside < 4 * size:
-            nside *= 2
-        bandlimit = 2 * size - 1
-        coefficients = seen.sky.integrals(seen.weights, min(bandlimit, 2 * seen.sky.bandlimit))
-        smooth = HealpixTransform(nside, bandlimit, real=True, threads=1)
-        weights = smooth.synthesis(resize(coefficients, bandlimit))
-        weights *= 4 * np.pi / weights.size / seen.noise_level**2
-        transform = HealpixTransform(nside, size, 2, threads=1)
-        return lambda plm: transform.adjoint_synthesis(weights * transform.synthesis(plm))
+        """Return Y^H W Y / n^2 for degrees below ``size``, by exact integrals."""
+        seen, bandlimit = self.observation, 3 * size - 2
+        scalar = SpinHarmonicTransform(bandlimit, real=True, threads=1)
+        weights = scalar.synthesis(resize(seen.weight_harmonics(2 * size - 1), bandlimit))
+        transform = SpinHarmonicTransform(bandlimit, 2, threads=1)
+
+        def weigh(plm: Array) -> Array:
+            values = transform.synthesis(resize(plm, bandlimit))
+            return resize(transform.analysis(weights * values), size)
+
+        return weigh
 
     def __call__(self, x: Array) -> Array:
         """Apply the preconditioner to a stack, shape (batch, L^2)."""
-        from scipy.linalg import cho_solve
-
         y = self._above(x)
         size = self._size
         low = x[:, 4 : size**2]
-        solved = cho_solve(self._factor, np.concatenate([low.real, low.imag], axis=1).T).T
+        solved = np.concatenate([low.real, low.imag], axis=1) @ self._inverse
         half = low.shape[1]
         y[:, 4 : size**2] = solved[:, :half] + 1j * solved[:, half:]
         return y

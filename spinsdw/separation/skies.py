@@ -77,12 +77,13 @@ class Sky(Protocol):
         """Apply the adjoint of `polarisation_map`: sums over samples."""
         ...
 
-    def coordinates(self, p: Array) -> Array:
-        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
+    @property
+    def areas(self) -> Array:
+        """Solid angle that each sample stands for; positive, of a shape that maps broadcast to."""
         ...
 
-    def adjoint_coordinates(self, values: Array) -> Array:
-        """Apply the adjoint of `coordinates`."""
+    def area_sums(self, weights: Array, bandlimit: int) -> Array:
+        """Return sums of Ylm* times weights over samples with their areas, l < bandlimit."""
         ...
 
     def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
@@ -149,13 +150,14 @@ class HealpixSky:
         """Apply the adjoint of `polarisation_map`: sums over samples."""
         return self._transform.adjoint_synthesis(p)
 
-    def coordinates(self, p: Array) -> Array:
-        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
-        return p * np.sqrt(4 * np.pi / p.shape[-1])
+    @property
+    def areas(self) -> Array:
+        """Solid angle that each sample stands for; positive, of a shape that maps broadcast to."""
+        return np.full(1, np.pi / (3 * self.nside**2))
 
-    def adjoint_coordinates(self, values: Array) -> Array:
-        """Apply the adjoint of `coordinates`."""
-        return self.coordinates(values)
+    def area_sums(self, weights: Array, bandlimit: int) -> Array:
+        """Return sums of Ylm* times weights over samples with their areas, l < bandlimit."""
+        return self.integrals(weights, bandlimit)
 
     def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
         """Return the values of a map at the samples nearest to colatitudes and longitudes."""
@@ -246,14 +248,18 @@ class GridSky:
         """Apply the adjoint of `polarisation_map`: sums over samples."""
         return self._cut(self._transform(2).adjoint_synthesis(p))
 
-    def coordinates(self, p: Array) -> Array:
-        """Return complex numbers whose sum of |squares| is the integral of |P|^2."""
-        # Those of the band-limited function the samples define: the grid's only exact integral.
-        return self._transform(2).analysis(p)
+    @property
+    def areas(self) -> Array:
+        """Solid angle that each sample stands for; positive, of a shape that maps broadcast to."""
+        # At a pole all samples are one, with the area of a cap of half a step.
+        grid = self.sampling
+        areas = np.maximum(np.sin(grid.colatitudes), np.pi / (8 * grid.n_rings))[:, None]
+        return np.asarray(areas * (4 * np.pi / (areas.sum() * grid.n_phi)))
 
-    def adjoint_coordinates(self, values: Array) -> Array:
-        """Apply the adjoint of `coordinates`."""
-        return self._transform(2).adjoint_analysis(values)
+    def area_sums(self, weights: Array, bandlimit: int) -> Array:
+        """Return sums of Ylm* times weights over samples with their areas, l < bandlimit."""
+        sums = self._transform(0, real=True).adjoint_synthesis(weights * self.areas)
+        return resize(sums, bandlimit)
 
     def nearest(self, values: Array, angles: tuple[Array, Array]) -> Array:
         """Return the values of a map at the samples nearest to colatitudes and longitudes."""

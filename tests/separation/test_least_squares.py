@@ -10,7 +10,7 @@ from spinsdw.harmonics import eb_to_spin, spin_to_eb
 from spinsdw.sampling import MW, MWSS
 from spinsdw.separation.least_squares import EBPrior, LeastSquares, Observation
 from spinsdw.separation.skies import GridSky, HealpixSky
-from tests.helpers import EPS, assert_close, random_flm, random_real_flm
+from tests.helpers import EPS, assert_close, random_flm, random_like, random_real_flm
 
 L = 8
 SKIES = [GridSky(MW(L)), GridSky(MWSS(L)), HealpixSky(4, L)]
@@ -56,33 +56,23 @@ def dense_fit(observation, prior, p):
 
 @each_sky
 def test_adjoints_of_the_sky(sky):
-    """<Y f, g> = <f, Y^H g> and <K f, g> = <f, K^H g>"""
-    rng = np.random.default_rng(0)
-    p, g = (rng.standard_normal(sky.points[0].shape) + 0j for _ in range(2))
+    """<Y f, g> = <f, Y^H g>"""
+    g = random_like(np.zeros(sky.map_shape, complex))
     plm = random_flm(L, 2, seed=2)
     left = np.vdot(sky.polarisation_map(plm), g)
     assert_close(np.vdot(plm, sky.adjoint_polarisation_map(g)), left, ulps=64 * L)
-    values = sky.coordinates(p)
-    other = random_flm(L, seed=3) if values.shape == plm.shape else g
-    left = np.vdot(values, other)
-    assert abs(np.vdot(p, sky.adjoint_coordinates(other)) - left) < 64 * L * EPS * np.sqrt(
-        np.vdot(values, values).real * np.vdot(other, other).real
-    )
 
 
-@pytest.mark.parametrize("sky", SKIES[:2], ids=["mw", "mwss"])
-def test_coordinates_on_a_grid_hold_the_power_of_the_sphere(sky):
-    """|K Y p|^2 = sum |p_lm|^2: the integral of |P|^2 over the sphere"""
-    plm = random_flm(L, 2, seed=4)
-    power = np.sum(np.abs(sky.coordinates(sky.polarisation_map(plm))) ** 2)
-    assert_close(power, np.sum(np.abs(plm) ** 2), ulps=64 * L)
-
-
-def test_coordinates_on_healpix_hold_the_sum_over_pixels():
-    """|K P|^2 = (4 pi / pixels) sum |P|^2"""
-    p = random_p(SKIES[2])
-    power = np.sum(np.abs(SKIES[2].coordinates(p)) ** 2)
-    assert_close(power, 4 * np.pi * np.mean(np.abs(p) ** 2), ulps=64 * L)
+@each_sky
+def test_areas_add_up_to_the_sphere(sky):
+    """sum of areas = 4 pi, all positive; their sums are near the integrals of smooth weights"""
+    areas = np.broadcast_to(sky.areas, sky.map_shape)
+    assert_close(areas.sum(), 4 * np.pi, ulps=256)
+    assert np.all(areas > 0)
+    sums = sky.area_sums(2 + np.cos(sky.points[0]), 3)
+    expected = np.zeros(9)
+    expected[[0, 2]] = 2 * np.sqrt(4 * np.pi), np.sqrt(4 * np.pi / 3)
+    assert np.max(np.abs(sums - expected)) < 0.02 * expected[0]
 
 
 @each_sky
@@ -106,7 +96,8 @@ def test_operators_are_symmetric_in_the_real_inner_product(sky):
     assert_close(root, root.T, ulps=1)
     observation = Observation(sky, uneven(sky), NOISE)
     seen = dense(observation.observe, L * L)
-    back = dense(observation.adjoint_observe, seen.shape[0] // 2)
+    shape = sky.map_shape
+    back = dense(lambda v: observation.adjoint_observe(v.reshape(shape)), seen.shape[0] // 2)
     assert_close(back, seen.T, ulps=64 * L)
 
 
@@ -169,14 +160,14 @@ def test_full_sky_with_little_noise_returns_e_and_b(sky):
         assert np.max(np.abs(found - truth)) < 1e-11 * np.max(np.abs(truth))
 
 
-@pytest.mark.parametrize("sky", SKIES[:2], ids=["mw", "mwss"])
-def test_full_sky_fit_on_a_grid_takes_one_step(sky):
-    """R^H R = 1 / n^2 on the whole grid: the preconditioner is the inverse"""
-    observation = Observation(sky, np.ones(sky.points[0].shape), NOISE)
-    solver = LeastSquares(observation, EBPrior(FALLING, 0.1 * FALLING))
+@each_sky
+def test_full_sky_fit_takes_few_steps(sky):
+    """R^H R is nearly 1 / n^2 on the whole sky: the preconditioner is nearly the inverse"""
+    observation = Observation(sky, np.ones(sky.map_shape), NOISE)
+    solver = LeastSquares(observation, EBPrior(FALLING, 0.1 * FALLING), 40, 1e-9)
     _, (history,) = solver.solve(random_p(sky))
-    assert history.iterations == 1
-    assert history.residual < 1e-11
+    assert history.converged
+    assert history.iterations <= 20
 
 
 @each_sky
