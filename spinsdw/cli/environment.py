@@ -24,6 +24,7 @@ PACKAGES = (
     "click",
     "rich",
     "matplotlib",
+    "zarr",
 )
 VARIABLES = ("SPINSDW_CACHE", "SPINSDW_VECTOR_WIDTH", "NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME")
 
