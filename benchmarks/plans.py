@@ -23,6 +23,8 @@ class Plan:
         L of the transforms that are held against pys2let, N = 3.
     batch_bandlimits : tuple of int
         L of the batches.
+    batch_nsides : tuple of int
+        HEALPix resolutions of the batches.
     batch : int
         Maps in a batch.
     growth_directions : tuple of int
@@ -43,6 +45,7 @@ class Plan:
     nsides: tuple[int, ...]
     s2let_bandlimits: tuple[int, ...]
     batch_bandlimits: tuple[int, ...]
+    batch_nsides: tuple[int, ...]
     batch: int
     growth_directions: tuple[int, ...]
     growth_bandlimit: int
@@ -63,6 +66,7 @@ PLANS = {
         nsides=(256, 512),
         s2let_bandlimits=(16, 32, 64, 128, 256, 512),
         batch_bandlimits=(128, 256, 512),
+        batch_nsides=(64, 128, 256),
         batch=16,
         growth_directions=(1, 2, 3, 4, 5, 6, 7, 8),
         growth_bandlimit=512,
@@ -77,6 +81,7 @@ PLANS = {
         nsides=(256, 512),
         s2let_bandlimits=(16, 32, 64, 128, 256),
         batch_bandlimits=(128, 256),
+        batch_nsides=(64, 128),
         batch=16,
         growth_directions=(1, 2, 3, 4, 5),
         growth_bandlimit=256,
@@ -91,6 +96,7 @@ PLANS = {
         nsides=(32, 64),
         s2let_bandlimits=(32, 64),
         batch_bandlimits=(64,),
+        batch_nsides=(32,),
         batch=16,
         growth_directions=(1, 2, 3, 4),
         growth_bandlimit=64,
@@ -105,6 +111,7 @@ PLANS = {
         nsides=(4,),
         s2let_bandlimits=(16,),
         batch_bandlimits=(8,),
+        batch_nsides=(4,),
         batch=3,
         growth_directions=(1, 2, 3),
         growth_bandlimit=8,

@@ -293,6 +293,11 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], Callable[[Rows], list[str]]]] = 
         lambda rows: _comparisons(rows, ["L"]),
     ),
     "batch": ("Batches", (), _batch),
+    "healpix batch": (
+        "Batches on HEALPix",
+        (),
+        lambda rows: _comparisons(rows, ["nside"]),
+    ),
     "threads": ("Threads", (), _threads),
     "growth": ("Growth", (), _growth),
     "memory": ("Memory", (), _memory),

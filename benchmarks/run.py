@@ -46,6 +46,7 @@ JOBS: dict[str, Job] = {
     "geometry": geometry.geometry,
     "wavelets": speed.wavelets,
     "batch": speed.batch,
+    "healpix batch": speed.healpix_batch,
     "threads": speed.threads,
     "growth": speed.growth,
     "pys2let": speed.pys2let,

@@ -26,6 +26,7 @@ __all__ = [
     "growth",
     "harmonic",
     "healpix",
+    "healpix_batch",
     "pys2let",
     "random_flm",
     "threads",
@@ -178,6 +179,34 @@ def _pys2let_rows(transform: SpinWaveletTransform, maps: Array, plan: Plan) -> I
         "pys2let": peers.pys2let_synthesis(transform, maps),
     }
     yield compare(calls, plan, fewest, direction="wavelet to map", **what)
+
+
+def healpix_batch(plan: Plan) -> Iterator[Row]:
+    """Many HEALPix maps in one call, against as many calls; L = 2 nside + 1."""
+    for nside in plan.batch_nsides:
+        for signal, spin, real in SIGNALS:
+            for count in plan.threads:
+                transform = HealpixTransform(nside, 2 * nside + 1, spin, real=real, threads=count)
+                flms = np.stack(
+                    [random_flm(2 * nside + 1, spin, real=real, seed=i) for i in range(plan.batch)]
+                )
+                maps = transform.synthesis(flms)
+                what = {"signal": signal, "nside": nside, "L": transform.bandlimit}
+                what |= {"threads": count, "maps": len(flms)}
+                for direction, call, given in (
+                    ("synthesis", transform.synthesis, flms),
+                    ("adjoint synthesis", transform.adjoint_synthesis, maps),
+                ):
+                    calls: Calls = {
+                        "spinsdw": partial(call, given),
+                        "single calls": partial(_one_by_one, call, given),
+                    }
+                    yield compare(calls, plan, direction=direction, **what)
+
+
+def _one_by_one(call: Callable[[Array], Array], batch: Array) -> None:
+    for one in batch:
+        call(one)
 
 
 def batch(plan: Plan) -> Iterator[Row]:
