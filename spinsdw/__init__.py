@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         RidgeletDirectionality,
         SteerableDirectionality,
     )
-    from spinsdw.polarisation import EBMaps, EBSeparator
+    from spinsdw.polarisation import EBErrors, EBMaps, EBSeparator
     from spinsdw.spin_transform import SpinHarmonicTransform
     from spinsdw.tiling import ScaleDiscretisedTiling
     from spinsdw.wavelet_transform import SpinWaveletTransform
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CurveletDirectionality",
+    "EBErrors",
     "EBMaps",
     "EBSeparator",
     "RidgeletDirectionality",
@@ -41,6 +42,7 @@ __all__ = [
 
 _HOMES = {
     "CurveletDirectionality": "spinsdw.directionality",
+    "EBErrors": "spinsdw.polarisation",
     "EBMaps": "spinsdw.polarisation",
     "EBSeparator": "spinsdw.polarisation",
     "RidgeletDirectionality": "spinsdw.directionality",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
@@ -11,26 +12,33 @@ import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import ParameterError, ShapeError
-from spinsdw.harmonics import check_bandlimit, multiply_by_degree, polarisation_factor
+from spinsdw.harmonics import (
+    check_bandlimit,
+    check_integer,
+    multiply_by_degree,
+    polarisation_factor,
+)
 from spinsdw.healpix import HealpixFit, check_nside, nested_to_ring, ring_to_nested
 from spinsdw.separation.inputs import (
     check_beam,
     check_inverse_noise,
+    check_spectrum,
     combine_masks,
     observed_stack,
     sky_of_stack,
 )
-from spinsdw.separation.least_squares import Convergence
+from spinsdw.separation.least_squares import Convergence, EBPrior
 from spinsdw.separation.method import Estimator, Method
 from spinsdw.separation.registry import resolve_method
 from spinsdw.separation.report import Clock, check_choice
 from spinsdw.separation.skies import GridSky, HealpixSky, position_map, sky_of
 from spinsdw.separation.survey import Survey
+from spinsdw.separation.uncertainty import draw_errors, estimate_spectra
 from spinsdw.signals import check_flag, refuse_masked
 from spinsdw.tiling import ScaleDiscretisedTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
-__all__ = ["EBMaps", "EBSeparator", "SeparationInfo"]
+__all__ = ["EBErrors", "EBMaps", "EBSeparator", "SeparationInfo"]
 
 Array = np.ndarray[Any, Any]
 AnySky = HealpixSky | GridSky
@@ -102,6 +110,30 @@ class EBMaps:
     weights: Mapping[int, Array]
     coefficients: WaveletCoefficients = field(repr=False)
     info: SeparationInfo
+
+
+@dataclass(frozen=True, eq=False)
+class EBErrors:
+    """Errors of E and B on simulated skies, estimate minus truth; zero where masked.
+
+    Attributes
+    ----------
+    E_draws, B_draws : ndarray, shape (draws, *map), float64
+        The errors of each sky.
+    """
+
+    E_draws: Array = field(repr=False)
+    B_draws: Array = field(repr=False)
+
+    @property
+    def E(self) -> Array:
+        """Root mean square error of E at each pixel, shape of one map."""
+        return np.asarray(np.sqrt(np.mean(self.E_draws**2, axis=0)))
+
+    @property
+    def B(self) -> Array:
+        """Root mean square error of B at each pixel, shape of one map."""
+        return np.asarray(np.sqrt(np.mean(self.B_draws**2, axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,6 +379,67 @@ class EBSeparator:
             coefficients=estimate.coefficients.reshape_batch(q.shape[: q.ndim - len(rows) + 1]),
             info=info,
         )
+
+    def uncertainty(
+        self,
+        maps: EBMaps,
+        *,
+        noise_level: float,
+        spectra: tuple[Array, Array] | None = None,
+        draws: int = 8,
+        seed: int = 0,
+    ) -> EBErrors:
+        """Simulate the errors of a separation: what it makes of known skies behind the same mask.
+
+        Parameters
+        ----------
+        maps : EBMaps
+            What `separate` of this separator returned, of one map or of maps of one kind.
+        noise_level : float
+            Noise of Q and of U, in the map's unit times radians, where mask and relative inverse
+            noise are 1.
+        spectra : pair of ndarray, shape (at least bandlimit,), optional
+            C_l of E and of B without beam, the square of the map's unit. None: the band powers of
+            ``maps`` where the sky is seen (eq-wavelet-prior).
+        draws : int, default 8
+            How many skies to separate; the error of an error falls as 1 / sqrt(2 draws).
+        seed : int, default 0
+            Seed of the skies.
+
+        Returns
+        -------
+        EBErrors
+            Errors of E and B at every pixel: each draw's, and their root mean square.
+
+        Raises
+        ------
+        ParameterError
+            If draws, seed or noise_level is out of range.
+        ShapeError, DataError
+            If a spectrum is too short or negative, or the maps are those of another sky.
+
+        Notes
+        -----
+        With `spinsdw.separation.Wiener` and the spectra of its prior, maps minus the error of a
+        draw is a constrained realisation: a sky from the posterior.
+        """
+        check_integer(draws, "draws", minimum=2, remedy="8 tell an error to a quarter")
+        check_integer(seed, "seed", minimum=0, remedy="0 is the default")
+        if not (math.isfinite(noise_level) and noise_level >= 0):
+            msg = f"noise_level={noise_level} must be finite and at least 0, in the map's unit."
+            raise ParameterError(msg)
+        sky = sky_of_stack(maps.E, self.mask, self.bandlimit, self.threads)
+        prepared = self._prepared(sky)
+        survey = prepared.survey
+        if spectra is None:
+            prior = estimate_spectra(survey, maps.coefficients, noise_level)
+        else:
+            beam = survey.beam**2
+            e, b = (check_spectrum(one, sky.bandlimit) for one in spectra)
+            prior = EBPrior(e * beam, b * beam)
+        plm = draw_errors(survey, prepared.estimator, prior, noise_level, draws, seed)
+        errors = sky.scalar_map(self._fields(plm)) * survey.observed
+        return EBErrors(self._reordered(errors.real, sky), self._reordered(errors.imag, sky))
 
     def bands(self, maps: EBMaps) -> dict[int | str, tuple[Array, Array]]:
         """Compute the E and B maps of each scale alone; they add up to E and B.

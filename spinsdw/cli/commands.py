@@ -22,6 +22,7 @@ ORDERINGS, POLCONVS = ("RING", "NESTED"), ("COSMO", "IAU")
 METHODS = (
     "hybrid",
     "projection",
+    "wiener",
     "pure",
     "pseudo",
     "masked",

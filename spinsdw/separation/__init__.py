@@ -14,6 +14,7 @@ from spinsdw.separation.projection import Projection
 from spinsdw.separation.pseudo import Pseudo
 from spinsdw.separation.pure import Pure
 from spinsdw.separation.recycling import Recycling
+from spinsdw.separation.wiener import Wiener
 
 __all__ = [
     "HarmonicPure",
@@ -24,4 +25,5 @@ __all__ = [
     "Pure",
     "Recycling",
     "SpinNeedlets",
+    "Wiener",
 ]

@@ -17,6 +17,7 @@ from spinsdw.simulation import gaussian_beam
 __all__ = [
     "check_beam",
     "check_inverse_noise",
+    "check_spectrum",
     "combine_masks",
     "observed_stack",
     "sky_of_stack",
@@ -82,6 +83,15 @@ def check_beam(beam: object, bandlimit: int) -> Array:
         msg = "beam holds values that are negative or not finite; a window function is neither."
         raise DataError(msg)
     return window
+
+
+def check_spectrum(values: object, bandlimit: int) -> Array:
+    """Return C_l for l = 0 to bandlimit - 1 of a power spectrum that may be longer."""
+    spectrum = np.array(values, dtype=np.float64)
+    if spectrum.ndim != 1 or spectrum.size < bandlimit:
+        msg = f"spectrum has shape {spectrum.shape}; it must hold C_l for l = 0 to {bandlimit - 1}."
+        raise ShapeError(msg)
+    return spectrum[:bandlimit]
 
 
 def _map_axes(values: Array, shape: tuple[int, ...] | None, bandlimit: int | None) -> int:

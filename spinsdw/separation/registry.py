@@ -13,6 +13,7 @@ from spinsdw.separation.pseudo import Pseudo
 from spinsdw.separation.pure import Pure
 from spinsdw.separation.recycling import Recycling
 from spinsdw.separation.report import check_choice
+from spinsdw.separation.wiener import Wiener
 
 __all__ = ["METHODS", "resolve_method"]
 
@@ -21,6 +22,7 @@ METHODS: dict[str, type[Method]] = {
     for kind in (
         Hybrid,
         Projection,
+        Wiener,
         Pure,
         Pseudo,
         Masked,

