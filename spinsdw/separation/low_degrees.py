@@ -62,21 +62,26 @@ class LowDegreeBlock:
         """Inverse of the matrix, for the real and imaginary parts of p_lm, l >= 2."""
         from scipy.linalg import eigh
 
-        size, first = self._size, 4
-        prior = EBPrior(self.prior.e_spectrum[:size], self.prior.b_spectrum[:size])
-        apply = self._weigher(size)
-        units = np.eye(size**2, dtype=np.complex128)[first:]
-        units = np.concatenate([units, 1j * units])
-        matrix = np.empty((len(units), len(units)))
-        for start in range(0, len(units), _BATCH):
-            rows = slice(start, start + _BATCH)
-            changed = units[rows] + prior.root(apply(prior.root(units[rows])))
-            matrix[rows] = np.concatenate(
-                [changed.real[:, first:], changed.imag[:, first:]], axis=1
-            )
-        values, vectors = eigh((matrix + matrix.T) / 2, overwrite_a=True)
+        values, vectors = eigh(self._matrix, overwrite_a=True)
         # 1 + a positive operator: what is below 1 comes from the sums over samples.
         return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T)
+
+    @property
+    def _matrix(self) -> Array:
+        """1 + S Y^H W Y S / n^2 on the real and imaginary parts of p_lm, l >= 2."""
+        from scipy.sparse import csr_array
+
+        size, first = self._size, 4
+        root = EBPrior(self.prior.e_spectrum[:size], self.prior.b_spectrum[:size]).root
+        apply = self._weigher(size)
+        ones = np.eye(size**2, dtype=np.complex128)[first:]
+        weighed = np.concatenate([apply(ones[i : i + _BATCH]) for i in range(0, len(ones), _BATCH)])
+        units = np.concatenate([ones, 1j * ones])
+        # S mixes real and imaginary parts, the weights do not: half the transforms.
+        seen = csr_array(root(units)[:, first:]) @ weighed
+        changed = (units + root(seen))[:, first:]
+        matrix = np.concatenate([changed.real, changed.imag], axis=1)
+        return np.asarray((matrix + matrix.T) / 2)
 
     def _weigher(self, size: int) -> Callable[[Array], Array]:
         """Return Y^H W Y / n^2 for degrees below ``size``, by exact integrals."""
@@ -96,7 +101,9 @@ class LowDegreeBlock:
         y = self._above(x)
         size = self._size
         low = x[:, 4 : size**2]
-        solved = np.concatenate([low.real, low.imag], axis=1) @ self._inverse
+        # Not by BLAS: after a product its threads wait for more, on the cores of our transforms.
+        parts = np.concatenate([low.real, low.imag], axis=1)
+        solved = np.einsum("bj,ij->bi", parts, self._inverse)
         half = low.shape[1]
         y[:, 4 : size**2] = solved[:, :half] + 1j * solved[:, half:]
         return y

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -138,7 +139,7 @@ class HealpixSky:
         transform = HealpixTransform(self.nside, bandlimit, real=True, threads=self.threads)
         return transform.adjoint_synthesis(weights) * (4 * np.pi / weights.size)
 
-    @property
+    @functools.cached_property
     def _transform(self) -> HealpixTransform:
         return HealpixTransform(self.nside, self.bandlimit, 2, threads=self.threads)
 
