@@ -5,22 +5,21 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from spinsdw.coefficients import WaveletCoefficients
-from spinsdw.directionality import Directionality, Orientations, SteerableDirectionality
+from spinsdw.directionality import Directionality, SteerableDirectionality
 from spinsdw.errors import ParameterError, ShapeError
-from spinsdw.grid_sums import GridSums, fill_negative_orders
+from spinsdw.grid_sums import fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
 from spinsdw.memory import MemoryEstimate
-from spinsdw.orientation_sums import OrientationSums
-from spinsdw.parallel import resolve_threads
 from spinsdw.ring_transform import HealpixTransform
 from spinsdw.rotated_wavelets import rotated_harmonics
 from spinsdw.sampling import Sampling, resolve_sampling
+from spinsdw.scale_sums import ScaleSums, ScalingSums, scale_sums
 from spinsdw.signals import check_flag, check_map, stored_dtype, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
@@ -36,9 +35,6 @@ Array = np.ndarray[Any, Any]
 # What coefficients may differ in from the transform that takes them: E and B are the parts of a
 # spin-2 analysis, and a scalar, maybe real, synthesis follows. Values are checked for being real.
 _FREE = {"spin", "real"}
-
-# With more orders a Fourier transform mixes them into orientations faster than a matrix.
-_MOST_MIXED_ORDERS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,92 +248,26 @@ class SpinWaveletTransform(WaveletFrame):
         return type(self._grid)(bandlimit if self.multiresolution else self.bandlimit)
 
     @functools.cached_property
-    def _scaling_transform(self) -> SpinHarmonicTransform:
+    def _scaling_sums(self) -> ScalingSums:
         grid = self.grid_of(self._tiling.scaling_bandlimit)
-        return SpinHarmonicTransform(
-            grid.bandlimit,
-            0,
-            sampling=grid,
-            real=self.real,
-            threads=self.threads,
-            dtype=self.dtype,
-        )
+        return ScalingSums(self.wavelets, self._dual, grid, self.harmonic)
+
+    @property
+    def _scaling_transform(self) -> SpinHarmonicTransform:
+        return self._scaling_sums.transform
 
     @functools.cached_property
-    def _scaling_factors(self) -> tuple[Array, Array]:
-        """sqrt(4 pi / (2l + 1)) phi_l0 of analysis and synthesis, at each (l, m) of their part."""
-        size = self._scaling_transform.bandlimit
-        el = np.arange(size)
-        ours, dual = (
-            np.sqrt(4 * np.pi / (2 * el + 1)) * wavelets.scaling_harmonics[:size]
-            for wavelets in (self.wavelets, self._dual)
-        )
-        return np.repeat(ours, 2 * el + 1), np.repeat(dual, 2 * el + 1)
+    def _scale_sums(self) -> dict[int, ScaleSums]:
+        found = {}
+        for j in self.scales:
+            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            found[j] = scale_sums(self.wavelets, self._dual, j, grid, self.harmonic)
+        return found
 
     def _workspace(self) -> Array:
         """Return room for the Fourier columns of any scale."""
-        largest = max(sums.workspace_size for sums, *_ in self._scale_sums.values())
+        largest = max(one.sums.workspace_size for one in self._scale_sums.values())
         return np.empty(largest, dtype=self.dtype)
-
-    @functools.cached_property
-    def _scale_sums(self) -> dict[int, tuple[GridSums | OrientationSums, Array, Array, int]]:
-        return {j: self._make_sums(j) for j in self.scales}
-
-    def _make_sums(self, scale: int) -> tuple[GridSums | OrientationSums, Array, Array, int]:
-        """Return the sums of one scale, psi and its dual padded to its grid, and lowest degree."""
-        grid = self.grid_of(self._tiling.scale_bandlimit(scale))
-        psi, dual = (one.wavelet_harmonics(scale) for one in (self.wavelets, self._dual))
-        # Orders beyond the scale's degrees, and of curvelets those below them, are zero.
-        kept = np.flatnonzero(np.any(psi, axis=1))
-        padding = ((0, 0), (0, grid.bandlimit - psi.shape[1]))
-        lowest = max(self._tiling.scale_lowest_degree(scale), self.wavelets.lowest_degree)
-        return (
-            self._sums_of(grid, self.wavelets.orientations_of(scale), kept),
-            np.pad(psi[kept], padding),
-            np.pad(dual[kept], padding),
-            min(lowest, grid.bandlimit),
-        )
-
-    def _sums_of(
-        self, grid: Sampling, orientations: Orientations, kept: Array
-    ) -> GridSums | OrientationSums:
-        orders = tuple(orientations.orders[i] for i in kept)
-        threads = resolve_threads(self.threads)
-        if orientations.count % 2 and len(orders) > _MOST_MIXED_ORDERS:
-            return OrientationSums(grid, orders, orientations, self.real, threads, self.dtype)
-        mixing = np.ascontiguousarray(orientations.orders_to_orientations[:, kept])
-        return GridSums(grid, orders, mixing, self.real, threads, self.dtype)
-
-    def _scale_to_grid(self, flm: Array, scale: int, workspace: Array, *, adjoint: bool) -> Array:
-        sums, psi, dual, lowest = self._scale_sums[scale]
-        count = self.shapes[scale][0]
-        weights = dual.conj() * (2 * np.pi / count) if adjoint else psi.conj()
-        batch = flm.reshape(-1, flm.shape[-1])
-        size = sums.sampling.bandlimit**2
-        maps = np.zeros((batch.shape[0], *sums.maps_shape), dtype=sums.maps_dtype)
-        if sums.orders:
-            sums = replace(sums, workspace=workspace)
-            for one, out in zip(batch, maps, strict=True):
-                sums.to_grid(one[None, :size], weights, lowest=lowest, quadrature=adjoint, out=out)
-        return maps.reshape(*flm.shape[:-1], *self.shapes[scale])
-
-    def _add_scales(self, values: dict[int, Array], flm: Array, *, adjoint: bool) -> None:
-        workspace = self._workspace()
-        for j, one in values.items():
-            self._add_scale(one, j, flm, workspace, adjoint=adjoint)
-
-    def _add_scale(
-        self, values: Array, scale: int, flm: Array, workspace: Array, *, adjoint: bool
-    ) -> None:
-        sums, psi, dual, lowest = self._scale_sums[scale]
-        if not sums.orders:
-            return
-        weights = psi if adjoint else dual * (2 * np.pi / self.shapes[scale][0])
-        sums, size = replace(sums, workspace=workspace), sums.sampling.bandlimit**2
-        for one, out in zip(values.reshape(-1, *values.shape[-3:]), flm, strict=True):
-            sums.from_grid(
-                one, weights, out=out[None, :size], lowest=lowest, quadrature=not adjoint
-            )
 
     def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
         """Return the bytes that one call of each method takes.
@@ -366,7 +296,7 @@ class SpinWaveletTransform(WaveletFrame):
         batch = check_integer(batch, "batch", minimum=0)
         flm = batch * 16 * self.bandlimit**2
         maps = self.harmonic.memory_estimate(batch)
-        sums = [sums for sums, *_ in self._scale_sums.values()]
+        sums = [one.sums for one in self._scale_sums.values()]
         wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
         scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
         room = np.dtype(self.dtype).itemsize * max(one.workspace_size for one in sums)
@@ -394,27 +324,15 @@ class SpinWaveletTransform(WaveletFrame):
         if isinstance(coefficients, WaveletCoefficients):
             self._check_memory(call, coefficients.scaling.shape[:-2])
 
-    def _scaling_to_grid(self, flm: Array, *, adjoint: bool) -> Array:
-        factor = self._scaling_factors[1 if adjoint else 0]
-        part = flm[..., : factor.size] * factor
-        part[..., : self.spin**2] = 0.0
-        transform = self._scaling_transform
-        return transform.adjoint_analysis(part) if adjoint else transform.synthesis(part)
-
-    def _add_scaling(self, scaling: Array, flm: Array, *, adjoint: bool) -> None:
-        transform = self._scaling_transform
-        part = transform.adjoint_synthesis(scaling) if adjoint else transform.analysis(scaling)
-        part *= self._scaling_factors[0 if adjoint else 1]
-        flm[..., : part.shape[-1]] += part
-
     def _decompose(
         self, flm_of: Callable[[int | str], Array], *, adjoint: bool
     ) -> WaveletCoefficients:
         """Analyse every part, each from the harmonic coefficients ``flm_of`` gives for it."""
-        scaling = self._scaling_to_grid(flm_of("scaling"), adjoint=adjoint)
+        scaling = self._scaling_sums.to_grid(flm_of("scaling"), adjoint=adjoint)
         workspace = self._workspace()
         wavelets = {
-            j: self._scale_to_grid(flm_of(j), j, workspace, adjoint=adjoint) for j in self.scales
+            j: sums.to_grid(flm_of(j), workspace, adjoint=adjoint)
+            for j, sums in self._scale_sums.items()
         }
         return WaveletCoefficients(scaling, wavelets, self._parameters)
 
@@ -430,11 +348,14 @@ class SpinWaveletTransform(WaveletFrame):
         wanted = set(self.shapes) if parts is None else self._checked_parts(parts)
         flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
-        self._add_scales({j: checked[j] for j in self.scales if j in wanted}, rows, adjoint=adjoint)
+        workspace = self._workspace()
+        for j, sums in self._scale_sums.items():
+            if j in wanted:
+                sums.add_to_harmonics(checked[j], rows, workspace, adjoint=adjoint)
         if self.real:
             fill_negative_orders(rows)
         if "scaling" in wanted:
-            self._add_scaling(scaling, flm, adjoint=adjoint)
+            self._scaling_sums.add_to_harmonics(scaling, flm, adjoint=adjoint)
         # A signal of spin s has no degrees below |s|.
         flm[..., : self.spin**2] = 0.0
         return flm

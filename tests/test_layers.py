@@ -39,7 +39,7 @@ LAYERS = (  # bottom to top
     {"ring_transform", "spin_transform"},
     {"wigner_transform"},
     {"rotation_group"},
-    {"coefficients"},
+    {"coefficients", "scale_sums"},
     {"wavelet_transform"},
     {"vector_spaces"},
     {"operators"},
@@ -57,6 +57,7 @@ LAYERS = (  # bottom to top
     {"cli"},
 )
 LATE = {  # what a method hands over to a layer above when it is called, and only then
+    "spinsdw.coefficients": {"spinsdw.healpix.coefficients"},
     "spinsdw.tiling.base": {"spinsdw.plotting"},
 }
 RANK = {name: rank for rank, layer in enumerate(LAYERS) for name in layer}
