@@ -13,6 +13,7 @@ import numpy as np
 
 from spinsdw.directionality import Orientations
 from spinsdw.errors import DataError, ParameterError, ShapeError
+from spinsdw.sampling import resolve_sampling
 from spinsdw.shrinkage import check_level, check_rule, fitting, shrink
 from spinsdw.signals import check_flag, refuse_masked
 from spinsdw.steering import strongest_orientations
@@ -483,6 +484,58 @@ class WaveletCoefficients:
             )
             raise DataError(msg)
         return strongest_orientations(values, self._orientations(scale), modulus=modulus)
+
+    def to_healpix(self, scale: int | str, nside: int, *, threads: int | None = None) -> Array:
+        """Evaluate the coefficients of one scale at the pixel centres of HEALPix, exactly.
+
+        What `healpix.coefficients_to_healpix` does, by what the coefficients know of themselves.
+
+        Parameters
+        ----------
+        scale : int or "scaling"
+            The part wanted.
+        nside : int
+            Resolution; it may be coarse, for no transform back is meant.
+        threads : int, optional
+            Threads to use; all cores when None.
+
+        Returns
+        -------
+        ndarray, shape (..., directions, 12 * nside**2)
+            RING order, each orientation a map, of the type of the coefficients; without the axis of
+            directions for the scaling part.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such part, ``nside`` is no HEALPix resolution, or the coefficients name
+            no sampling of this package.
+        ShapeError
+            If the part's shape is not that of the sampling.
+
+        Examples
+        --------
+        >>> from spinsdw.wavelet_transform import SpinWaveletTransform
+        >>> transform = SpinWaveletTransform(16, spin=2, directions=3)
+        >>> transform.analysis_harmonic(np.ones(256)).to_healpix(2, nside=4).shape
+        (3, 192)
+        """
+        from spinsdw.healpix.coefficients import samples_to_healpix
+
+        is_scaling = isinstance(scale, str) and scale == "scaling"
+        values = self._scaling if is_scaling else self[scale]  # type: ignore[index]
+        # All grids have 2 L - 1 points a ring, and MWSS has 2 L.
+        grid = resolve_sampling(self._parameters.get("sampling", ""), (values.shape[-1] + 1) // 2)
+        if values.shape[-2:] != grid.shape:
+            name = "scaling part" if is_scaling else f"scale {scale}"
+            rings, phi = grid.shape
+            msg = (
+                f"{name} has shape {values.shape}; it must be (..., {rings}, {phi}), as {grid!r} "
+                "has it."
+            )
+            raise ShapeError(msg)
+        orientations = None if is_scaling else self._orientations(scale)  # type: ignore[arg-type]
+        return samples_to_healpix(values, grid, orientations, nside, threads=threads)
 
     def _orientations(self, scale: int) -> Orientations:
         count = self._wavelets[scale].shape[-3]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import CurveletDirectionality, RidgeletDirectionality
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.healpix import coefficients_to_healpix, flm_to_map, pixel_directions
+from spinsdw.sampling import SAMPLINGS
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import direct_function, random_flm, random_real_flm, wavelet_wigner
 
@@ -107,3 +109,40 @@ def test_bad_scales_resolutions_and_coefficients_are_refused():
         coefficients_to_healpix(transform, coefficients, 1, 0)
     with pytest.raises(ShapeError, match="use the transform that made them"):
         coefficients_to_healpix(SpinWaveletTransform(16, 2, 3), coefficients, 1, NSIDE)
+
+
+@pytest.mark.parametrize("sampling", list(SAMPLINGS))
+@pytest.mark.parametrize("options", [{}, {"multiresolution": False}, {"real": True}], ids=repr)
+def test_coefficients_know_enough_of_themselves(sampling, options):
+    for size in (1, 2, 7, 8):
+        transform = SpinWaveletTransform(size, 0, min(size, 2), sampling=sampling, **options)
+        coefficients = transform.analysis_harmonic(random_real_flm(size, batch=(2,)))
+        for part in transform.shapes:
+            expected = coefficients_to_healpix(transform, coefficients, part, NSIDE)
+            assert np.array_equal(coefficients.to_healpix(part, NSIDE), expected)
+
+
+def test_coefficients_of_curvelets_and_parts_of_a_spin_signal_know_it_too():
+    """Re W of a spin signal is a real function of rotations: its maps are real parts"""
+    transform = SpinWaveletTransform(9, 2, directionality=CurveletDirectionality())
+    coefficients = transform.analysis_harmonic(random_flm(9, 2))
+    for j in transform.scales:
+        expected = coefficients_to_healpix(transform, coefficients, j, NSIDE)
+        assert np.array_equal(coefficients.to_healpix(j, NSIDE), expected)
+        real = coefficients.map(np.real).to_healpix(j, NSIDE)
+        assert real.dtype == np.float64
+        np.testing.assert_allclose(real, expected.real, rtol=0, atol=1e-12)
+
+
+def test_coefficients_say_what_they_cannot_evaluate():
+    coefficients = SpinWaveletTransform(8).analysis_harmonic(np.ones(64))
+    for part in (9, "scale", None):
+        with pytest.raises(ParameterError, match=f"scale={part!r} is not held"):
+            coefficients.to_healpix(part, NSIDE)
+    other = WaveletCoefficients(coefficients.scaling, {1: coefficients[1]}, {"directions": 1})
+    with pytest.raises(ParameterError, match="sampling='' is not known"):
+        other.to_healpix(1, NSIDE)
+    turned = {1: coefficients[1].swapaxes(-1, -2)}
+    wrong = WaveletCoefficients(coefficients.scaling, turned, coefficients.parameters)
+    with pytest.raises(ShapeError, match=r"scale 1 has shape \(1, 7, 4\); it must be"):
+        wrong.to_healpix(1, NSIDE)

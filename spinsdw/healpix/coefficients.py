@@ -17,7 +17,7 @@ from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from spinsdw.wigner_transform import WignerTransform
 
-__all__ = ["coefficients_to_healpix"]
+__all__ = ["coefficients_to_healpix", "samples_to_healpix"]
 
 Array = NDArray[Any]
 
@@ -68,57 +68,75 @@ def coefficients_to_healpix(
     if not isinstance(scale, int | np.integer | str) or scale not in arrays:
         msg = f"scale={scale!r} is not held; give 'scaling' or one of {transform.scales}."
         raise ParameterError(msg)
+    tiling, orientations = transform.wavelets.tiling, None
+    size = tiling.scaling_bandlimit if scale == "scaling" else tiling.scale_bandlimit(int(scale))
+    if scale != "scaling":
+        orientations = transform.wavelets.orientations_of(int(scale))
+    grid = transform.grid_of(size)
+    return samples_to_healpix(arrays[scale], grid, orientations, nside, threads=transform.threads)
+
+
+def samples_to_healpix(
+    values: Array,
+    grid: Sampling,
+    orientations: Orientations | None,
+    nside: int,
+    *,
+    threads: int | None = None,
+) -> Array:
+    """Evaluate one part's samples at the pixel centres; `coefficients_to_healpix` says how.
+
+    Parameters
+    ----------
+    values : ndarray, shape (..., orientations, rings, phi), or (..., rings, phi)
+        The samples, real or complex.
+    grid : Sampling
+        Where they are.
+    orientations : Orientations or None
+        Theirs; None for a scaling part.
+    nside : int
+        Resolution.
+    threads : int, optional
+        Threads to use; all cores when None.
+
+    Returns
+    -------
+    ndarray, shape (..., orientations, 12 * nside**2), or (..., 12 * nside**2)
+        RING order, of the type of ``values``.
+    """
     nside = check_nside(nside)
-    values = arrays[scale]
-    tiling = transform.wavelets.tiling
-    if scale == "scaling":
-        grid = transform.grid_of(tiling.scaling_bandlimit)
-        harmonic = SpinHarmonicTransform(
-            grid.bandlimit, sampling=grid, real=transform.real, threads=transform.threads
-        )
-        flm = harmonic.analysis(values)
-        return flm_to_map(flm, nside, real=transform.real, threads=transform.threads)
-    grid = transform.grid_of(tiling.scale_bandlimit(int(scale)))
+    if orientations is None:
+        real = bool(np.isrealobj(values))
+        harmonic = SpinHarmonicTransform(grid.bandlimit, sampling=grid, real=real, threads=threads)
+        maps = flm_to_map(harmonic.analysis(values), nside, real=real, threads=threads)
+        return np.asarray(maps, dtype=values.dtype)
     rows = values.reshape(-1, *values.shape[-3:])
-    maps = [_scale_maps(transform, row, grid, int(scale), nside) for row in rows]
-    shape = (*values.shape[:-2], 12 * nside**2)
-    return np.array(maps, dtype=values.dtype).reshape(shape)
+    found = [_scale_maps(row, grid, orientations, nside, threads) for row in rows]
+    return np.array(found, dtype=values.dtype).reshape(*values.shape[:-2], 12 * nside**2)
 
 
 def _scale_maps(
-    transform: SpinWaveletTransform, values: Array, grid: Sampling, scale: int, nside: int
+    values: Array, grid: Sampling, orientations: Orientations, nside: int, threads: int | None
 ) -> Array:
     """Return the maps of one signal, shape (orientations, pixels)."""
-    orientations = transform.wavelets.orientations_of(scale)
     orders = tuple(n for n in orientations.orders if abs(n) < grid.bandlimit)
     maps = np.zeros((orientations.count, 12 * nside**2), dtype=values.dtype)
     if not orders:
         return maps
-    coefficients = _wigner(transform, values, grid, orientations, orders)
+    real = bool(np.isrealobj(values))
+    wigner = WignerTransform(grid.bandlimit, orders, sampling=grid, real=real, threads=threads)
+    weights = orientations.steering_weights(wigner.gammas)
+    coefficients = wigner.analysis(np.einsum("gk,ktp->gtp", weights, values))
     el = np.repeat(np.arange(grid.bandlimit), 2 * np.arange(grid.bandlimit) + 1)
     factor = np.sqrt((2 * el + 1) / (4 * np.pi)) / (2 * np.pi)
     for n, row in zip(orders, coefficients, strict=True):
         # Of real coefficients the orders n and -n are conjugate fields.
-        if transform.real and n < 0:
+        if real and n < 0:
             continue
-        part = flm_to_map((-1) ** n * factor * row, nside, -n, threads=transform.threads)
+        part = flm_to_map((-1) ** n * factor * row, nside, -n, threads=threads)
         phases = np.exp(1j * n * orientations.angles)[:, None]
-        if transform.real:
+        if real:
             maps += (2 if n else 1) * (phases * part).real
         else:
             maps += phases * part
     return maps
-
-
-def _wigner(
-    transform: SpinWaveletTransform,
-    values: Array,
-    grid: Sampling,
-    orientations: Orientations,
-    orders: tuple[int, ...],
-) -> Array:
-    wigner = WignerTransform(
-        grid.bandlimit, orders, sampling=grid, real=transform.real, threads=transform.threads
-    )
-    turned = np.einsum("gk,ktp->gtp", orientations.steering_weights(wigner.gammas), values)
-    return wigner.analysis(turned)
