@@ -118,7 +118,7 @@ class EBErrors:
 
     Attributes
     ----------
-    E_draws, B_draws : ndarray, shape (draws, *map), float64
+    E_draws, B_draws : ndarray, shape (draws, map), float64
         The errors of each sky.
     """
 

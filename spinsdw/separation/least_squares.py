@@ -283,7 +283,7 @@ class LeastSquares:
 
         Parameters
         ----------
-        p : ndarray, shape (batch, *map), complex128
+        p : ndarray, shape (batch, map), complex128
             P = Q + iU; finite where the weights are not 0, and zero or finite elsewhere.
 
         Returns

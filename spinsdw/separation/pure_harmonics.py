@@ -29,7 +29,7 @@ def pure_harmonics(
         The pixelisation.
     mask : SmoothMask
         M and its derivatives at the sky's samples.
-    p : ndarray, shape (..., *map), complex128
+    p : ndarray, shape (..., map), complex128
         P = Q + iU, ring order; finite where M is 0.
     bandlimit : int, optional
         One more than the largest degree wanted; the sky's when None.
