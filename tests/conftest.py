@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-# Before scipy is imported: BLAS threads would wait for work on the cores of our own threads, which
+# Before numpy is imported: BLAS threads would wait for work on the cores of our own threads, which
 # makes small matrices tens of times slower on a busy machine.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

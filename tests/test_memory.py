@@ -145,12 +145,20 @@ def test_single_precision_takes_half_but_for_harmonic_coefficients(directions, s
 @pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("direction", ["harmonic to wavelet", "wavelet to harmonic"])
-@pytest.mark.parametrize(("bandlimit", "directions"), [(1024, 3), (2048, 5), (4096, 1)])
+@pytest.mark.parametrize(
+    ("bandlimit", "directions", "dtype"),
+    [
+        (1024, 3, "complex128"),
+        (2048, 5, "complex128"),
+        (2048, 5, "complex64"),
+        (4096, 1, "complex128"),
+    ],
+)
 def test_a_process_grows_by_the_estimate_and_less_than_half_beyond_the_data(
-    bandlimit, directions, direction
+    bandlimit, directions, dtype, direction
 ):
     """peak < 1.5 (input + output), and within 5 % of the estimate."""
-    case = {"L": bandlimit, "N": directions, "threads": 2, "direction": direction}
+    case = {"L": bandlimit, "N": directions, "threads": 2, "direction": direction, "dtype": dtype}
 
     def run(bandlimit):
         argument = json.dumps({**case, "L": bandlimit})

@@ -66,14 +66,15 @@ def direct_shares(transform, key, holes, points):
     grid = transform.grid_of(size)
     table = spin_harmonics(size, transform.spin, theta, phi)
     columns = [wigner_column(size, n, grid.colatitudes) for n in psi_orders]
+    turns = np.exp(-1j * np.outer(orders(size), grid.longitudes))
     shares = np.empty((gammas.size, *grid.shape))
-    for k, t, p in np.ndindex(shares.shape):
+    for k, t in np.ndindex(shares.shape[:2]):
         at_pole = sum(
             column[t] * row[degrees(size)] * np.exp(-1j * n * gammas[k])
             for column, row, n in zip(columns, psi, psi_orders, strict=True)
         )
-        values = table @ (at_pole * np.exp(-1j * orders(size) * grid.longitudes[p]))
-        shares[k, t, p] = np.sum(area * holes * np.abs(values) ** 2)
+        values = table @ (at_pole[:, None] * turns)
+        shares[k, t] = (area * holes) @ np.abs(values) ** 2
     return shares.reshape(transform.shapes[key]) / np.sum(np.abs(psi) ** 2)
 
 
