@@ -66,9 +66,7 @@ def _by_order(maps: Array) -> Array:
 def _products(one: Array, other: Array, transform: SpinWaveletTransform, key: int | str) -> Array:
     """Return the integral of one * conj(other) at each orientation, shape (..., orientations)."""
     is_scaling = key == "scaling"
-    tiling = transform.wavelets.tiling
-    size = tiling.scaling_bandlimit if is_scaling else tiling.scale_bandlimit(int(key))
-    grid = transform.grid_of(size)
+    grid = transform.part_grid(key)
     step: int = 2
     orders: tuple[int, ...] = (0,)
     if not is_scaling:

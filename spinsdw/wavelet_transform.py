@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from spinsdw.coefficient_checks import check_coefficients, check_wanted
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality, SteerableDirectionality
-from spinsdw.errors import ParameterError, ShapeError
+from spinsdw.errors import ParameterError
 from spinsdw.grid_sums import fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
 from spinsdw.memory import MemoryEstimate
@@ -20,7 +21,7 @@ from spinsdw.ring_transform import HealpixTransform
 from spinsdw.rotated_wavelets import rotated_harmonics
 from spinsdw.sampling import Sampling, resolve_sampling
 from spinsdw.scale_sums import ScaleSums, ScalingSums, scale_sums
-from spinsdw.signals import check_flag, check_map, stored_dtype, writable
+from spinsdw.signals import check_flag, stored_dtype, writable
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.tiling import ScaleDiscretisedTiling, Tiling
 from spinsdw.wavelet_frame import WaveletFrame
@@ -31,10 +32,6 @@ from spinsdw.wigner_parts import check_parts, orders_to_samples, part_shapes, sa
 __all__ = ["SpinWaveletTransform"]
 
 Array = np.ndarray[Any, Any]
-
-# What coefficients may differ in from the transform that takes them: E and B are the parts of a
-# spin-2 analysis, and a scalar, maybe real, synthesis follows. Values are checked for being real.
-_FREE = {"spin", "real"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +190,7 @@ class SpinWaveletTransform(WaveletFrame):
     @property
     def bandlimits(self) -> dict[int, int]:
         """Bandlimit at which each scale is sampled."""
-        return {j: self.grid_of(self._tiling.scale_bandlimit(j)).bandlimit for j in self.scales}
+        return {j: self.part_grid(j).bandlimit for j in self.scales}
 
     @property
     def orientations(self) -> Array:
@@ -208,7 +205,7 @@ class SpinWaveletTransform(WaveletFrame):
         """Shape of the scaling part and of each scale, for one signal."""
         found: dict[int | str, tuple[int, ...]] = {"scaling": self._scaling_transform.shape}
         for j in self.scales:
-            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            grid = self.part_grid(j)
             found[j] = (self.wavelets.orientations_of(j).count, *grid.shape)
         return found
 
@@ -247,10 +244,15 @@ class SpinWaveletTransform(WaveletFrame):
         """Return the grid for coefficients of a bandlimit: the full one without multiresolution."""
         return type(self._grid)(bandlimit if self.multiresolution else self.bandlimit)
 
+    def part_grid(self, part: int | str) -> Sampling:
+        """Return the grid of the scaling part, "scaling", or of one scale."""
+        if part == "scaling":
+            return self.grid_of(self._tiling.scaling_bandlimit)
+        return self.grid_of(self._tiling.scale_bandlimit(int(part)))
+
     @functools.cached_property
     def _scaling_sums(self) -> ScalingSums:
-        grid = self.grid_of(self._tiling.scaling_bandlimit)
-        return ScalingSums(self.wavelets, self._dual, grid, self.harmonic)
+        return ScalingSums(self.wavelets, self._dual, self.part_grid("scaling"), self.harmonic)
 
     @property
     def _scaling_transform(self) -> SpinHarmonicTransform:
@@ -258,11 +260,8 @@ class SpinWaveletTransform(WaveletFrame):
 
     @functools.cached_property
     def _scale_sums(self) -> dict[int, ScaleSums]:
-        found = {}
-        for j in self.scales:
-            grid = self.grid_of(self._tiling.scale_bandlimit(j))
-            found[j] = scale_sums(self.wavelets, self._dual, j, grid, self.harmonic)
-        return found
+        pair, harmonic = (self.wavelets, self._dual), self.harmonic
+        return {j: scale_sums(*pair, j, self.part_grid(j), harmonic) for j in self.scales}
 
     def _workspace(self) -> Array:
         """Return room for the Fourier columns of any scale."""
@@ -345,7 +344,7 @@ class SpinWaveletTransform(WaveletFrame):
     ) -> Array:
         checked = self._checked(coefficients)
         scaling = checked["scaling"]
-        wanted = set(self.shapes) if parts is None else self._checked_parts(parts)
+        wanted = set(self.shapes) if parts is None else check_wanted(parts, self.shapes)
         flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
         workspace = self._workspace()
@@ -360,48 +359,8 @@ class SpinWaveletTransform(WaveletFrame):
         flm[..., : self.spin**2] = 0.0
         return flm
 
-    def _checked_parts(self, parts: Collection[int | str]) -> set[int | str]:
-        known = set(self.shapes)
-        is_list = isinstance(parts, Collection) and not isinstance(parts, str)
-        if not is_list or not all(isinstance(part, Hashable) and part in known for part in parts):
-            msg = (
-                f"parts={parts!r} must be among 'scaling' and the scales {self.scales}; "
-                "pass a tuple of them."
-            )
-            raise ParameterError(msg)
-        return set(parts)
-
     def _checked(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
-        if not isinstance(coefficients, WaveletCoefficients):
-            msg = (
-                f"coefficients is a {type(coefficients).__name__}; pass the WaveletCoefficients "
-                "that analysis returns."
-            )
-            raise ParameterError(msg)
-        if coefficients.scales != self.scales:
-            msg = (
-                f"coefficients have scales {coefficients.scales} but the transform has "
-                f"{self.scales}; use the transform that made them."
-            )
-            raise ShapeError(msg)
-        found: dict[int | str, Array] = {}
-        for key, shape in self.shapes.items():
-            values = coefficients.scaling if key == "scaling" else coefficients[int(key)]
-            name = "scaling part" if key == "scaling" else f"scale {key}"
-            found[key] = check_map(values, shape, real=self.real, name=name, may_be_single=True)
-        self._check_parameters(coefficients)
-        return found
-
-    def _check_parameters(self, coefficients: WaveletCoefficients) -> None:
-        """Refuse coefficients of other wavelets that happen to have the same shapes."""
-        ours, theirs = self._parameters, coefficients.parameters
-        for name in sorted((set(ours) | set(theirs)) - _FREE):
-            if ours.get(name) != theirs.get(name):
-                msg = (
-                    f"coefficients have {name}={theirs.get(name)!r} but the transform has "
-                    f"{ours.get(name)!r}; use the transform that made them."
-                )
-                raise ParameterError(msg)
+        return check_coefficients(coefficients, self.shapes, self._parameters)
 
     def arrays(self, coefficients: WaveletCoefficients) -> dict[int | str, Array]:
         """Return the arrays of coefficients, "scaling" first, after checking that they are ours.
@@ -575,7 +534,7 @@ class SpinWaveletTransform(WaveletFrame):
         scaling = self._scaling_transform.analysis(checked["scaling"])
         parts: dict[int | str, Array] = {"scaling": scaling[..., : shapes["scaling"][0]]}
         for j in self.scales:
-            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            grid = self.part_grid(j)
             orientations = self.wavelets.orientations_of(j)
             rows = samples_to_orders(checked[j], grid, orientations, threads=self.threads)
             parts[j] = rows[..., : shapes[j][1]]
@@ -605,7 +564,7 @@ class SpinWaveletTransform(WaveletFrame):
         part = resize(checked["scaling"], scaling.bandlimit)
         stored, wavelets = stored_dtype(self.dtype, real=self.real), {}
         for j in self.scales:
-            grid = self.grid_of(self._tiling.scale_bandlimit(j))
+            grid = self.part_grid(j)
             orientations = self.wavelets.orientations_of(j)
             values = orders_to_samples(
                 checked[j], grid, orientations, real=self.real, threads=self.threads

@@ -40,6 +40,7 @@ LAYERS = (  # bottom to top
     {"wigner_transform"},
     {"rotation_group"},
     {"coefficients", "scale_sums"},
+    {"coefficient_checks"},
     {"wavelet_transform"},
     {"vector_spaces"},
     {"operators"},

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Orientations
 from spinsdw.errors import ParameterError
+from spinsdw.harmonics import degrees
 from spinsdw.healpix.grids import flm_to_map
 from spinsdw.healpix.pixels import check_nside
 from spinsdw.sampling import Sampling
@@ -68,11 +69,9 @@ def coefficients_to_healpix(
     if not isinstance(scale, int | np.integer | str) or scale not in arrays:
         msg = f"scale={scale!r} is not held; give 'scaling' or one of {transform.scales}."
         raise ParameterError(msg)
-    tiling, orientations = transform.wavelets.tiling, None
-    size = tiling.scaling_bandlimit if scale == "scaling" else tiling.scale_bandlimit(int(scale))
-    if scale != "scaling":
-        orientations = transform.wavelets.orientations_of(int(scale))
-    grid = transform.grid_of(size)
+    is_scaling = scale == "scaling"
+    orientations = None if is_scaling else transform.wavelets.orientations_of(int(scale))
+    grid = transform.part_grid(scale)
     return samples_to_healpix(arrays[scale], grid, orientations, nside, threads=transform.threads)
 
 
@@ -127,8 +126,7 @@ def _scale_maps(
     wigner = WignerTransform(grid.bandlimit, orders, sampling=grid, real=real, threads=threads)
     weights = orientations.steering_weights(wigner.gammas)
     coefficients = wigner.analysis(np.einsum("gk,ktp->gtp", weights, values))
-    el = np.repeat(np.arange(grid.bandlimit), 2 * np.arange(grid.bandlimit) + 1)
-    factor = np.sqrt((2 * el + 1) / (4 * np.pi)) / (2 * np.pi)
+    factor = np.sqrt((2 * degrees(grid.bandlimit) + 1) / (4 * np.pi)) / (2 * np.pi)
     for n, row in zip(orders, coefficients, strict=True):
         # Of real coefficients the orders n and -n are conjugate fields.
         if real and n < 0:

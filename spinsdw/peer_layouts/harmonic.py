@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from spinsdw.errors import ParameterError, ShapeError
-from spinsdw.harmonics import bandlimit_of, check_bandlimit, check_flm, check_integer, index
+from spinsdw.harmonics import (
+    bandlimit_of,
+    check_bandlimit,
+    check_flm,
+    check_integer,
+    degrees,
+    index,
+    orders,
+)
 
 __all__ = [
     "flm_to_s2fft",
@@ -24,9 +32,7 @@ Array = np.ndarray[Any, Any]
 
 def _places(bandlimit: int) -> tuple[Array, Array]:
     """Return degree and column of every coefficient in s2fft's rectangle."""
-    el = np.repeat(np.arange(bandlimit), 2 * np.arange(bandlimit) + 1)
-    m = np.arange(bandlimit**2) - el**2 - el
-    return el, m + bandlimit - 1
+    return degrees(bandlimit), orders(bandlimit) + bandlimit - 1
 
 
 def flm_to_s2fft(flm: Array) -> Array:

@@ -138,7 +138,7 @@ class _Layout:
         """Return a scaling part of one spin as a field of another with the same coefficients."""
         if source == target:
             return values
-        grid = self.transform.grid_of(self.transform.wavelets.tiling.scaling_bandlimit)
+        grid = self.transform.part_grid("scaling")
         if max(abs(source), abs(target)) >= grid.bandlimit:
             return np.zeros(grid.shape, dtype=np.complex128)
         first, second = (

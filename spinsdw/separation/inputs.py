@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from spinsdw.errors import DataError, ShapeError
+from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.healpix import check_mask, clean_polarisation, nested_to_ring, nside_of
 from spinsdw.sampling import MW, MWSS
 from spinsdw.separation.skies import GridSky, HealpixSky, sky_of
@@ -17,6 +17,7 @@ from spinsdw.simulation import gaussian_beam
 __all__ = [
     "check_beam",
     "check_inverse_noise",
+    "check_largest_share",
     "check_spectrum",
     "combine_masks",
     "observed_stack",
@@ -50,6 +51,14 @@ def combine_masks(mask: object) -> Array:
     product = check_mask(product, product.shape)
     product.setflags(write=False)
     return product
+
+
+def check_largest_share(value: object) -> float:
+    """Return the share of a wavelet's energy in the hole from which its coefficient is dropped."""
+    if not isinstance(value, int | float | np.number) or not 0 < value <= 1:
+        msg = f"largest_share={value!r} must be a share of energy in (0, 1]; 0.2 is usual."
+        raise ParameterError(msg)
+    return float(value)
 
 
 def check_inverse_noise(values: object, shape: tuple[int, ...] | None) -> Array:

@@ -18,6 +18,7 @@ import numpy as np
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import multiply_by_degree, resize
 from spinsdw.separation.energy_share import correlate_with_energy, wavelet_energy
+from spinsdw.separation.inputs import check_largest_share
 from spinsdw.separation.method import Estimate
 from spinsdw.separation.survey import Survey
 from spinsdw.spin_transform import SpinHarmonicTransform
@@ -47,10 +48,7 @@ class SpinNeedlets:
     largest_share: float = 0.2
 
     def __post_init__(self) -> None:
-        value = self.largest_share
-        if not isinstance(value, int | float | np.number) or not 0 < value <= 1:
-            msg = f"largest_share={value!r} must be a share of energy in (0, 1]; 0.2 is usual."
-            raise ParameterError(msg)
+        check_largest_share(self.largest_share)
 
     def prepare(self, survey: Survey) -> NeedletEstimator:
         """Return the estimator for a survey."""

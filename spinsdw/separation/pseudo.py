@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from spinsdw.errors import ParameterError
 from spinsdw.masks import taper
+from spinsdw.separation.inputs import check_largest_share
 from spinsdw.separation.method import Estimate
 from spinsdw.separation.survey import Survey
 
@@ -43,10 +43,7 @@ class Pseudo:
     largest_share: float = 0.2
 
     def __post_init__(self) -> None:
-        value = self.largest_share
-        if not isinstance(value, int | float | np.number) or not 0 < value <= 1:
-            msg = f"largest_share={value!r} must be a share of energy in (0, 1]; 0.2 is usual."
-            raise ParameterError(msg)
+        check_largest_share(self.largest_share)
 
     def prepare(self, survey: Survey) -> PseudoEstimator:
         """Return the estimator for a survey."""

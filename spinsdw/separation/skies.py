@@ -329,7 +329,7 @@ def position_map(
         Weights in [0, 1], interpolated linearly in both angles: harmonics would ring where the
         weights fall steeply.
     """
-    grid = transform.grid_of(transform.bandlimits[scale])
+    grid = transform.part_grid(scale)
     colatitudes, longitudes = sky.points
     rings = grid.colatitudes
     last = grid.n_rings - 1

@@ -59,7 +59,7 @@ def estimate_spectra(
     powers: dict[int, Array] = {}
     for j in survey.transform.scales:
         share = survey.shares[j]
-        grid = survey.transform.grid_of(survey.transform.bandlimits[j])
+        grid = survey.transform.part_grid(j)
         areas = np.broadcast_to(position_areas(grid), share.shape) * (share < _SEEN_SHARE)
         if areas.any():
             powers[j] = _band_powers(coefficients[j], areas, tiling.kernel(j)) - noise_level**2

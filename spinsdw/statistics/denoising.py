@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import ParameterError
-from spinsdw.statistics.spectra import part_grid
 from spinsdw.statistics.theory import check_spectrum, wavelet_covariance
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -146,7 +145,7 @@ def shrinkage_levels(
     found = {}
     for j in transform.scales:
         covariance = wavelet_covariance(transform.wavelets, c_l, j)
-        areas = part_grid(transform, j).weights[:, None]
+        areas = transform.part_grid(j).weights[:, None]
         risks = _stein_risks(arrays[j], covariance, areas)
         found[j] = float(_LEVELS[np.argmin(risks)])
     return found

@@ -14,7 +14,7 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import resize
 from spinsdw.spin_transform import SpinHarmonicTransform
-from spinsdw.statistics.spectra import part_grid, sphere_mean
+from spinsdw.statistics.spectra import sphere_mean
 from spinsdw.tiling import LowpassTiling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
@@ -90,7 +90,7 @@ def scattering(transform: SpinWaveletTransform, coefficients: WaveletCoefficient
     second: dict[tuple[int, int], Array] = {}
     for j in transform.scales:
         modulus = np.abs(arrays[j])
-        first[j] = sphere_mean(modulus, part_grid(transform, j))
+        first[j] = sphere_mean(modulus, transform.part_grid(j))
         if j > transform.scales[0]:
             second |= _second(transform, modulus, j)
     return Scattering(MappingProxyType(first), MappingProxyType(second))
@@ -110,7 +110,7 @@ def _second(
     transform: SpinWaveletTransform, modulus: Array, scale: int
 ) -> dict[tuple[int, int], Array]:
     """Return the second order of one scale with every larger one."""
-    grid = part_grid(transform, scale)
+    grid = transform.part_grid(scale)
     harmonic = SpinHarmonicTransform(
         grid.bandlimit, sampling=grid, real=True, threads=transform.threads
     )
@@ -118,7 +118,7 @@ def _second(
     # Larger scales see nothing above their own bandlimit.
     found = inner.analysis_harmonic(resize(harmonic.analysis(modulus), inner.bandlimit))
     return {
-        (scale, j): sphere_mean(np.abs(found[j]), part_grid(inner, j))
+        (scale, j): sphere_mean(np.abs(found[j]), inner.part_grid(j))
         for j in inner.scales
         if j < scale
     }
@@ -126,7 +126,7 @@ def _second(
 
 def _larger_scales(transform: SpinWaveletTransform, scale: int) -> SpinWaveletTransform:
     """Return scalar wavelets of the same kind, whose kernels below a scale are the same."""
-    tiling, grid = transform.wavelets.tiling, part_grid(transform, scale)
+    tiling, grid = transform.wavelets.tiling, transform.part_grid(scale)
     # The last scale of a tiling takes all that is left, so there must be one more.
     beyond = math.floor(tiling.edges[scale - 1]) + 2  # type: ignore[attr-defined]
     size = min(max(tiling.scale_bandlimit(scale - 1), beyond), transform.bandlimit)

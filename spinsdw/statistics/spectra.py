@@ -13,18 +13,9 @@ from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.sampling import Sampling
 from spinsdw.wavelet_transform import SpinWaveletTransform
 
-__all__ = ["part_grid", "scale_spectra", "sphere_mean"]
+__all__ = ["scale_spectra", "sphere_mean"]
 
 Array = NDArray[Any]
-
-
-def part_grid(transform: SpinWaveletTransform, key: int | str) -> Sampling:
-    """Return the grid of the scaling part or of one scale."""
-    tiling = transform.wavelets.tiling
-    is_scaling = key == "scaling"
-    return transform.grid_of(
-        tiling.scaling_bandlimit if is_scaling else tiling.scale_bandlimit(int(key))
-    )
 
 
 def sphere_mean(values: Array, grid: Sampling) -> Array:
@@ -93,7 +84,7 @@ def scale_spectra(
         raise ParameterError(msg)
     found: dict[int | str, Array] = {}
     for key, values in arrays.items():
-        grid, shape = part_grid(transform, key), transform.shapes[key]
+        grid, shape = transform.part_grid(key), transform.shapes[key]
         areas = _areas(given.get(key, 1.0), grid, shape, key)
         total = np.sum(areas, axis=(-2, -1))
         products = values * others[key].conj()

@@ -12,7 +12,6 @@ from spinsdw.maps_io import read_polarisation
 from spinsdw.simulation import gaussian_flm
 from spinsdw.statistics import denoise, shrinkage_levels, wavelet_variance
 from spinsdw.statistics.denoising import _LEVELS, _stein_risks
-from spinsdw.statistics.spectra import part_grid
 from spinsdw.statistics.theory import wavelet_covariance
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import assert_close, needs_compiler, random_flm
@@ -99,7 +98,7 @@ def test_steins_estimate_is_the_error_in_the_mean(spin, directions, real):
     noisy = transform.analysis_harmonic(signal + draws)
     scale = transform.scales[-1]
     covariance = wavelet_covariance(transform.wavelets, noise, scale)
-    areas = part_grid(transform, scale).weights[:, None]
+    areas = transform.part_grid(scale).weights[:, None]
     variance = covariance[0, 0].real
     constant = directions * variance * np.sum(areas * np.ones(transform.shapes[scale][1:]))
     differences = np.array(
