@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, dataclass
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from scipy.special import eval_legendre
 
 from spinsdw.errors import ParameterError, ShapeError
 from spinsdw.sampling import (
@@ -19,10 +21,21 @@ from spinsdw.sampling import (
     GaussLegendre,
     HealpixRings,
     Sampling,
+    WeightedRings,
     resolve_sampling,
 )
-from spinsdw.sampling.weighted import WeightedRings
-from tests.helpers import assert_close, needs_compiler, random_like, sizes, small_d
+from spinsdw.spin_transform import SpinHarmonicTransform
+from spinsdw.wavelet_transform import SpinWaveletTransform
+from spinsdw.wigner_transform import WignerTransform
+from tests.helpers import (
+    assert_close,
+    direct_map,
+    needs_compiler,
+    random_flm,
+    random_like,
+    sizes,
+    small_d,
+)
 
 GRIDS = list(SAMPLINGS.values())
 BANDLIMITS = [1, 2, 3, 4, 9]
@@ -315,3 +328,44 @@ def test_healpix_pixels_have_equal_areas(nside):
 def test_nside_is_a_positive_integer(nside):
     with pytest.raises(ParameterError, match=r"nside=.* must be an integer of at least 1"):
         HealpixRings(nside)
+
+
+@dataclass(frozen=True)
+class Uneven(WeightedRings):
+    """Any rings, with the weights that integrate all polynomials which so many can."""
+
+    name: ClassVar[str] = "uneven"
+    is_symmetric: ClassVar[bool] = False
+
+    @property
+    def n_rings(self):
+        return 2 * self.bandlimit - 1
+
+    @property
+    def colatitudes(self):
+        t = (np.arange(self.n_rings) + 0.5) / self.n_rings
+        return np.pi * (t + 0.02 * np.sin(3 * np.pi * t))
+
+    @property
+    def rule(self):
+        degree = np.arange(self.n_rings)[:, None]
+        polynomials = eval_legendre(degree, np.cos(self.colatitudes))
+        return np.linalg.solve(polynomials, np.where(degree[:, 0] == 0, 2.0, 0.0))
+
+
+@pytest.mark.parametrize("bandlimit", [1, 2, 3, 8])
+def test_rings_of_ones_own_are_a_sampling_of_everything(bandlimit):
+    """On the sphere, on the rotation group and of wavelets, synthesis undoes analysis"""
+    grid, spin = Uneven(bandlimit), min(1, bandlimit - 1)
+    flm = random_flm(bandlimit, spin)
+    transform = SpinHarmonicTransform(bandlimit, spin, sampling=grid)
+    maps = transform.synthesis(flm)
+    assert_close(
+        maps, direct_map(flm, spin, grid.colatitudes, grid.longitudes), ulps=64 * bandlimit
+    )
+    assert_close(transform.analysis(maps), flm, ulps=256 * bandlimit)
+    wavelets = SpinWaveletTransform(bandlimit, spin, min(2, bandlimit), sampling=grid)
+    assert_close(wavelets.synthesis(wavelets.analysis(maps)), maps, ulps=512 * bandlimit)
+    wigner = WignerTransform(bandlimit, (0,), sampling=grid)
+    function = random_flm(bandlimit)[None]
+    assert_close(wigner.analysis(wigner.synthesis(function)), function, ulps=256 * bandlimit)

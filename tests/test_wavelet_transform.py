@@ -416,6 +416,21 @@ def test_real_signals_take_the_same_way(directions, sampling):
     assert_all_close(half.adjoint_synthesis_harmonic(flm), desired, ulps=tolerance(12))
 
 
+@pytest.mark.parametrize("directions", [1, 2, 3])
+@pytest.mark.parametrize("sampling", list(SAMPLINGS))
+def test_real_signals_take_half_the_memory(sampling, directions):
+    """Maps, coefficients and Fourier columns; harmonic coefficients stay L * L."""
+    options = {"directions": directions, "sampling": sampling, "threads": 1}
+    real, both = (SpinWaveletTransform(16, real=one, **options) for one in (True, False))
+    flm = random_real_flm(16)
+    maps = [one.harmonic.synthesis(flm) for one in (real, both)]
+    assert 2 * maps[0].nbytes == maps[1].nbytes
+    assert 2 * real.analysis(maps[0]).nbytes == both.analysis(maps[1]).nbytes
+    estimates = [one.memory_estimate()["synthesis_harmonic"] for one in (real, both)]
+    assert 2 * estimates[0].input == estimates[1].input
+    assert estimates[0].output == estimates[1].output == flm.nbytes
+
+
 @pytest.mark.parametrize("sampling", ["mw", "mwss"])
 @pytest.mark.parametrize(("spin", "directions"), [(0, 3), (2, 2), (-3, 5)])
 def test_a_scale_on_its_own_grid_holds_what_the_full_grid_holds(spin, directions, sampling):

@@ -8,6 +8,7 @@ from spinsdw.sampling.gauss_legendre import GaussLegendre
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.sampling.names import SAMPLINGS, resolve_sampling
 from spinsdw.sampling.uniform_rings import ClenshawCurtis, DriscollHealy, Fejer1
+from spinsdw.sampling.weighted import WeightedRings
 
 __all__ = [
     "MW",
@@ -19,5 +20,6 @@ __all__ = [
     "GaussLegendre",
     "HealpixRings",
     "Sampling",
+    "WeightedRings",
     "resolve_sampling",
 ]

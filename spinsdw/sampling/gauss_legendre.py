@@ -83,5 +83,6 @@ class GaussLegendre(WeightedRings):
         return _nodes(self.bandlimit)[0]
 
     @property
-    def _rule(self) -> Array:
+    def rule(self) -> Array:
+        """What multiplies each ring in the integral over cos(theta); float64, shape (n_rings,)."""
         return _nodes(self.bandlimit)[1]

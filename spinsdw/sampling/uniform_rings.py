@@ -54,7 +54,8 @@ class _FejerRings(WeightedRings):
         return (2 * np.arange(self.n_rings) + 1) * np.pi / (2 * self.n_rings)
 
     @property
-    def _rule(self) -> Array:
+    def rule(self) -> Array:
+        """What multiplies each ring in the integral over cos(theta); float64, shape (n_rings,)."""
         return _fejer_weights(self.n_rings)
 
 
@@ -140,5 +141,6 @@ class ClenshawCurtis(WeightedRings):
         return np.pi * np.arange(self.n_rings) / (self.n_rings - 1)
 
     @property
-    def _rule(self) -> Array:
+    def rule(self) -> Array:
+        """What multiplies each ring in the integral over cos(theta); float64, shape (n_rings,)."""
         return _clenshaw_curtis_weights(self.n_rings)

@@ -27,7 +27,28 @@ _M_STEP = 32
 
 @dataclass(frozen=True)
 class WeightedRings(Sampling):
-    """What these samplings share; each gives its rings and their weights."""
+    """Any rings of 2 L - 1 points each with a rule for them; the base of samplings of one's own.
+
+    A subclass is a frozen dataclass that gives `n_rings`, `colatitudes`, `rule`, a ``name``, and
+    ``is_symmetric = False`` where its rings do not mirror each other. Its analysis inverts its
+    synthesis where the rule is exact for polynomials in cos(theta) up to degree 2 L - 2.
+
+    Parameters
+    ----------
+    bandlimit : int
+        Signals have degrees l < bandlimit.
+
+    Examples
+    --------
+    The midpoints of rings of equal height hold a constant and nothing else.
+
+    >>> class Midpoints(WeightedRings):
+    ...     name, n_rings = "midpoints", 4
+    ...     colatitudes = np.arccos([0.75, 0.25, -0.25, -0.75])
+    ...     rule = np.full(4, 0.5)
+    >>> float(Midpoints(1).integrate(np.ones((4, 1))).round(12)) == round(4 * np.pi, 12)
+    True
+    """
 
     is_symmetric: ClassVar[bool] = True
 
@@ -43,13 +64,13 @@ class WeightedRings(Sampling):
 
     @property
     @abc.abstractmethod
-    def _rule(self) -> Array:
-        """What multiplies each ring in the integral over cos(theta)."""
+    def rule(self) -> Array:
+        """What multiplies each ring in the integral over cos(theta); float64, shape (n_rings,)."""
 
     @functools.cached_property
     def weights(self) -> Array:
         """Weight of each point of a ring; float64, shape (n_rings,)."""
-        weights = self._rule * (2 * np.pi / self.n_phi)
+        weights = self.rule * (2 * np.pi / self.n_phi)
         weights.flags.writeable = False
         return weights
 

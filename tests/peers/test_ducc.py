@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from spinsdw.directionality import (
     SteerableDirectionality,
 )
 from spinsdw.harmonics import eb_to_spin, index, spin_to_eb
+from spinsdw.sampling import WeightedRings
 from spinsdw.spin_transform import SpinHarmonicTransform
 from spinsdw.wavelet_transform import SpinWaveletTransform
 from tests.helpers import (
@@ -23,6 +27,28 @@ from tests.helpers import (
 )
 
 ducc0 = pytest.importorskip("ducc0")
+
+
+@dataclass(frozen=True)
+class Fejer2(WeightedRings):
+    """Fejer's second rule, which the package has not: rings at the inner points of [0, pi]."""
+
+    name: ClassVar[str] = "fejer2"
+
+    @property
+    def n_rings(self):
+        return 2 * self.bandlimit - 1
+
+    @property
+    def colatitudes(self):
+        return np.pi * np.arange(1, self.n_rings + 1) / (self.n_rings + 1)
+
+    @property
+    def rule(self):
+        odd = np.arange(1, self.n_rings + 1, 2)
+        sines = np.sin(np.outer(self.colatitudes, odd)) @ (1 / odd)
+        return 4 / (self.n_rings + 1) * np.sin(self.colatitudes) * sines
+
 
 GEOMETRIES = {"mw": "MW", "mwss": "CC", "dh": "F1", "gl": "GL", "cc": "CC", "fejer1": "F1"}
 
@@ -169,3 +195,23 @@ def test_synthesis_at_points_agrees(spin):
     flm = eb_to_spin(*pair) if spin else pair[0]
     found = transform.synthesis_at(flm, *points.T)
     assert relative_error(found, values[0] + 1j * values[1] if spin else values[0]) < 4e-12
+
+
+@pytest.mark.parametrize(("bandlimit", "spin"), sizes_and_spins([1, 2, 7, 32], [0, 1, 2]))
+def test_a_sampling_of_ones_own_is_the_peers_further_grid(bandlimit, spin):
+    """Fejer's second rule, by a subclass: the same maps, and the same coefficients of them"""
+    grid = Fejer2(bandlimit)
+    transform = SpinHarmonicTransform(bandlimit, spin, sampling=grid)
+    pair = random_pair(bandlimit, spin)
+    options = {"spin": spin, "lmax": bandlimit - 1, "geometry": "F2"}
+    alm = np.array([to_peer(flm, bandlimit) for flm in pair])
+    maps = ducc0.sht.synthesis_2d(alm=alm, ntheta=grid.n_rings, nphi=grid.n_phi, **options)
+    flm = eb_to_spin(*pair) if spin else pair[0]
+    desired = maps[0] + 1j * maps[1] if spin else maps[0] + 0j
+    assert_close(transform.synthesis(flm), desired, ulps=tolerance(bandlimit))
+    again = ducc0.sht.analysis_2d(map=maps, **options)
+    found = transform.analysis(desired)
+    assert_close(found, flm, ulps=tolerance(bandlimit))
+    fields = spin_to_eb(found) if spin else [found]
+    for one, other in zip(fields, again, strict=True):
+        assert_close(to_peer(one, bandlimit), other, ulps=2 * tolerance(bandlimit))
