@@ -188,7 +188,7 @@ class EBSeparator:
     mask : ndarray, or sequence of ndarray, optional
         1 where observed, 0 where not: HEALPix (1-D) or an MW or MWSS map (2-D). Several masks are
         multiplied. None: full sky.
-    method : str or object, default "pseudo"
+    method : str or object, default "hybrid"
         The estimator: a name, or an object of `spinsdw.separation` that holds its free choices.
     directions : int, default 1
         N of the wavelets.
@@ -229,7 +229,7 @@ class EBSeparator:
 
     bandlimit: int | None = None
     mask: Array | None = None
-    method: str | Method = "pseudo"
+    method: str | Method = "hybrid"
     directions: int = 1
     dilation: float = 2.0
     lowest_scale: int = 2
@@ -244,7 +244,7 @@ class EBSeparator:
         bandlimit: int | None = None,
         mask: Array | None = None,
         *,
-        method: str | Method = "pseudo",
+        method: str | Method = "hybrid",
         directions: int = 1,
         dilation: float = 2.0,
         lowest_scale: int | None = None,

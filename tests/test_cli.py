@@ -71,7 +71,9 @@ def out(tmp_path):
 
 
 def run(*arguments, out, pictures=False):
-    """Run a command; return exit status, stdout and stderr."""
+    """Run a command; return exit status, stdout and stderr. The method is one that is quick."""
+    if arguments[0] == "separate" and "--method" not in arguments:
+        arguments = (*arguments, "--method", "pseudo")
     shown = ["--output", str(out), "--pictures" if pictures else "--no-pictures"]
     result = CliRunner().invoke(main, [*map(str, arguments), *shown], catch_exceptions=False)
     return result.exit_code, result.stdout, result.stderr

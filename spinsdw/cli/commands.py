@@ -135,7 +135,7 @@ _mask_options = _decorate(
 )
 _method_options = _decorate(
     click.option("--bandlimit", type=int, help="Degrees are below it [2 nside + 1]."),
-    click.option("--method", type=click.Choice(METHODS), default="pseudo", show_default=True),
+    click.option("--method", type=click.Choice(METHODS), default="hybrid", show_default=True),
     click.option("--directions", type=int, default=1, show_default=True, help="Of the wavelets."),
     click.option("--dilation", type=float, default=2.0, show_default=True, help="Ratio of scales."),
     click.option("--lowest-scale", type=int, help="Larger structures are one part [2]."),

@@ -103,7 +103,11 @@ def _degrees(maps: EBMaps) -> str:
 
 
 def _fit(maps: EBMaps) -> str:
-    fit: Any = maps.info.fit  # never None, as the maps are HEALPix
+    fit, regularised = maps.info.fit, maps.info.convergence
+    if regularised:
+        return f"{regularised[0].iterations} iterations, residual {regularised[0].residual:.1e}"
+    if fit is None:
+        return "none"
     return (
         f"{fit.iterations} iterations, residual {fit.residual:.1e}; "
         f"{fit.map_residual:.1%} of the masked map is beyond these degrees"

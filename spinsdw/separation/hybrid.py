@@ -28,7 +28,7 @@ from spinsdw.separation.ensemble import ShareBins, draw_fields, draw_white, posi
 from spinsdw.separation.least_squares import Convergence, EBPrior
 from spinsdw.separation.method import Estimate
 from spinsdw.separation.pure_harmonics import pure_harmonics
-from spinsdw.separation.regularised import FitChoices, RegularisedFit
+from spinsdw.separation.regularised import FitChoices, RegularisedFit, separate_whole
 from spinsdw.separation.smooth_masks import SmoothMask, SmoothMasks
 from spinsdw.separation.survey import Survey
 
@@ -173,7 +173,7 @@ class HybridEstimator:
     def _smooth_mask(self) -> SmoothMask | None:
         """The mask of the pure estimator; None where it is not wanted or does not fit."""
         wanted = self.method.pure_width
-        if self.survey.mask is None or wanted == 0:
+        if wanted == 0:
             return None
         masks = SmoothMasks(self.survey.sky, self.survey.footprint)
         if masks.widest < masks.narrowest:
@@ -185,10 +185,6 @@ class HybridEstimator:
     def regimes(self) -> Mapping[int | str, ScaleRegime]:
         """What is done at each scale, and at the scaling part."""
         survey, method = self.survey, self.method
-        if survey.mask is None:
-            one = np.ones(1)
-            full = ScaleRegime(np.zeros(1), one, np.zeros(1), one)
-            return dict.fromkeys(survey.transform.shapes, full)
         drawn = np.concatenate(draw_fields(self._drawn_from, method.draws, method.seed))
         noise = draw_white(survey, method.draws, method.seed)
         p = survey.observed * survey.sky.polarisation_map(np.concatenate([drawn, noise]))
@@ -235,6 +231,8 @@ class HybridEstimator:
 
     def estimate(self, p: Array) -> Estimate:
         """Separate maps, shape (batch, *map)."""
+        if self.survey.mask is None:
+            return separate_whole(self.survey, p)
         with_pure = any(regime.pure.any() for regime in self.regimes.values())
         (fitted, left, pure), convergence = self._parts(p, with_pure=with_pure)
         # E leaks nothing that matters into itself: all of its residual is kept.

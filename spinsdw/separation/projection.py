@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from spinsdw.separation.method import Estimate
-from spinsdw.separation.regularised import FitChoices, RegularisedFit
+from spinsdw.separation.regularised import FitChoices, RegularisedFit, separate_whole
 from spinsdw.separation.survey import Survey
 
 __all__ = ["Projection", "ProjectionEstimator"]
@@ -89,6 +89,8 @@ class ProjectionEstimator:
 
     def estimate(self, p: Array) -> Estimate:
         """Separate maps, shape (batch, *map)."""
+        if self.survey.mask is None:
+            return separate_whole(self.survey, p)
         plm, convergence = self.fit.fit(p)
         plm += self.fit.residual(p, plm)
         coefficients = self.survey.transform.analysis_harmonic(plm)

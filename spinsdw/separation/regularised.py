@@ -19,9 +19,10 @@ from spinsdw.harmonics import check_integer
 from spinsdw.separation.inputs import check_spectrum
 from spinsdw.separation.least_squares import Convergence, EBPrior, LeastSquares, Observation
 from spinsdw.separation.low_degrees import LowDegreeBlock
+from spinsdw.separation.method import Estimate
 from spinsdw.separation.survey import Survey
 
-__all__ = ["FitChoices", "RegularisedFit", "flat_spectrum"]
+__all__ = ["FitChoices", "RegularisedFit", "flat_spectrum", "separate_whole"]
 
 Array = np.ndarray[Any, Any]
 
@@ -35,6 +36,12 @@ def flat_spectrum(survey: Survey) -> Array:
     spectrum = np.zeros(survey.bandlimit)
     spectrum[2:] = 2 * np.pi / (el[2:] * (el[2:] + 1))
     return spectrum * survey.beam**2
+
+
+def separate_whole(survey: Survey, p: Array) -> Estimate:
+    """Separate maps of the full sky, where E and B are known and nothing has to be assumed."""
+    plm, fit = survey.sky.polarisation_coefficients(p)
+    return Estimate(survey.transform.analysis_harmonic(plm), fit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from spinsdw.separation.regularised import FitChoices, RegularisedFit, flat_spec
 from spinsdw.separation.skies import GridSky, HealpixSky
 from spinsdw.separation.survey import Survey
 from spinsdw.wavelet_transform import SpinWaveletTransform
-from tests.helpers import assert_close, needs_compiler, random_flm, random_real_flm
+from tests.helpers import EPS, assert_close, needs_compiler, random_flm, random_real_flm
 
 NSIDE, L = 16, 33
 METHODS = [Projection(max_iterations=40), Hybrid(draws=2, max_iterations=40)]
@@ -52,14 +52,14 @@ def steep_eb(seed, size=L):
 @each_method
 @pytest.mark.parametrize("shape", ["mw", "healpix"])
 def test_full_sky_separation_is_exact(method, shape):
-    """Fit and residual add up to the whole map, whatever the prior holds down"""
+    """Without a mask nothing is assumed: no prior takes part"""
     e_lm, b_lm = random_real_flm(16, seed=1), random_real_flm(16, seed=2)
     e_lm[:4] = b_lm[:4] = 0
     sky = GridSky(MW(16)) if shape == "mw" else HealpixSky(NSIDE, 16)
     p = sky.polarisation_map(eb_to_spin(e_lm, b_lm))
     maps = EBSeparator(16, method=method).separate(p.real, p.imag)
-    # On HEALPix the residual is read off by quadrature, exact to its weights.
-    ulps = 1e9 if shape == "healpix" else 64 * 16
+    # On HEALPix coefficients are fitted, to ten times the tolerance of 1e-10.
+    ulps = 1e-9 / EPS if shape == "healpix" else 64 * 16
     assert_close(maps.E, sky.scalar_map(e_lm).real, ulps)
     assert_close(maps.B, sky.scalar_map(b_lm).real, ulps)
     assert maps.info.kept_fraction[2] == 1
