@@ -31,11 +31,15 @@ _NOISE_SHARE = 2 * math.pi / 10800
 
 
 def flat_spectrum(survey: Survey) -> Array:
-    """Return C_l = 2 pi / (l (l + 1)) smoothed by the survey's beam, zero at l < 2."""
+    """Return C_l = 2 pi / (l (l + 1)), zero at l < 2.
+
+    It is not smoothed by the beam: a prior that falls below the noise at small scales would leave
+    E there in the residual.
+    """
     el = np.arange(survey.bandlimit, dtype=np.float64)
     spectrum = np.zeros(survey.bandlimit)
     spectrum[2:] = 2 * np.pi / (el[2:] * (el[2:] + 1))
-    return spectrum * survey.beam**2
+    return spectrum
 
 
 def separate_whole(survey: Survey, p: Array) -> Estimate:
