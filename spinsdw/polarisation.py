@@ -316,6 +316,39 @@ class EBSeparator:
             held[sky] = _Prepared(survey, self.method.prepare(survey))  # type: ignore[union-attr]
         return held[sky]
 
+    def prepare(self) -> EBSeparator:
+        """Compute now what depends on the mask only, and return the separator itself.
+
+        It is kept, shared by all maps that follow, and pickled with the separator: a pool of
+        processes, or a run of tomorrow, takes it from there.
+
+        Returns
+        -------
+        EBSeparator
+            The separator, for ``separator = EBSeparator(...).prepare()``.
+
+        Raises
+        ------
+        ParameterError
+            If there is no mask, so that nothing is to prepare.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from spinsdw.masks import galactic_cut
+        >>> separator = EBSeparator(17, galactic_cut(8, 0.3), method="pseudo").prepare()
+        >>> separator.separate(*np.ones((2, 768))).info.method
+        'pseudo'
+        """
+        if self.mask is None:
+            msg = "mask=None leaves nothing to prepare; give a mask, or separate maps at once."
+            raise ParameterError(msg)
+        prepared = self._prepared(sky_of_stack(self.mask, self.mask, self.bandlimit, self.threads))
+        # A map of zeros goes through every step and asks for all that is computed once.
+        prepared.estimator.estimate(np.zeros((1, *prepared.survey.map_shape), np.complex128))
+        prepared.kept_fraction, prepared.weight_maps  # noqa: B018
+        return self
+
     def separate(self, q: Array, u: Array) -> EBMaps:
         """Separate Stokes Q and U into E and B.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import pickle
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from spinsdw.harmonics import eb_to_spin, lower_spin, raise_spin, resize
 from spinsdw.healpix import UNSEEN, convert_polconv, flm_to_map, pixel_directions, ring_to_nested
 from spinsdw.masks import distance_to_edge, galactic_cut, taper
 from spinsdw.polarisation import EBSeparator
-from spinsdw.separation import Pseudo
+from spinsdw.separation import Hybrid, Pseudo
 from spinsdw.separation.energy_share import energy_shares
 from spinsdw.separation.skies import sky_of
 from spinsdw.simulation import simulate_eb, simulate_qu
@@ -682,3 +683,18 @@ def test_nested_mask_needs_a_power_of_two():
 
 def test_default_is_the_hybrid_method():
     assert EBSeparator(L).method.name == "hybrid"
+
+
+@pytest.mark.parametrize("method", ["pseudo", "projection", Hybrid(draws=2, max_iterations=8)])
+def test_prepared_separator_can_be_sent_elsewhere(method):
+    """What was prepared travels with the separator; its results are the same"""
+    separator = EBSeparator(17, galactic_cut(8, 0.3), method=method).prepare()
+    sent = pickle.loads(pickle.dumps(separator))
+    (prepared,) = sent._estimators.values()
+    assert {"kept_fraction", "weight_maps"} <= set(vars(prepared))
+    if isinstance(method, Hybrid):
+        assert "regimes" in vars(prepared.estimator)
+    q, u = random_qu("healpix")
+    assert_same_maps(sent.separate(q, u), separator.separate(q, u))
+    with pytest.raises(ParameterError, match="mask=None leaves nothing to prepare"):
+        EBSeparator(L).prepare()
