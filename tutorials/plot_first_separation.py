@@ -119,4 +119,5 @@ for j in maps.info.scales:
 
 # %%
 # At scale 4 and beyond B is B. The coarse scales are what the mask takes; no weighting brings
-# them back, and a more faithful estimator has to model E behind the mask.
+# them back. A more faithful method has to model E behind the mask: the lesson on a ground-based
+# experiment uses one.

@@ -81,8 +81,8 @@ draw({"noise of Q and U": np.sqrt(1 / np.where(seen, inverse_noise, 1)) * 2}, un
 # The hybrid method fits E and B together, and decides for every scale, and for every distance from
 # the edge, how much to take from the fit and how much from what it leaves, by separating a few
 # random skies behind this very mask. That is done once; each further map takes a second or so.
-# The method needs no spectra. It is told the beam, because a flat prior is smoothed by it, and
-# the inverse noise, because it weighs the pixels.
+# The method needs no spectra. The inverse noise weighs the pixels, and the beam is that of the
+# skies that will be simulated below.
 from spinsdw import EBSeparator
 
 separator = EBSeparator(bandlimit, mask, method="hybrid", inverse_noise=inverse_noise, beam=fwhm)

@@ -1,7 +1,12 @@
 """The methods of E/B separation: one file each, and what they share.
 
-An object of one of these classes is a method with its free choices; `spinsdw.EBSeparator` takes it,
-or its name, as ``method``.
+An object of one of these classes is a method with its free choices; `spinsdw.EBSeparator` takes it
+as ``method``, or its name, which stands for the defaults:
+
+- fits of E and B: ``"hybrid"`` is `Hybrid`, ``"projection"`` `Projection`, ``"wiener"`` `Wiener`;
+- smooth masks: ``"pure"`` is `Pure`, ``"harmonic-pure"`` `HarmonicPure`;
+- weights: ``"pseudo"`` is `Pseudo`, ``"needlets"`` `SpinNeedlets`;
+- to compare with: ``"masked"`` is `Masked`, ``"recycling"`` `Recycling`.
 """
 
 from __future__ import annotations
