@@ -201,7 +201,7 @@ class EBSeparator:
         methods that fit weigh the pixels. None: uniform.
     beam : float or ndarray, optional
         Beam of the maps: full width at half maximum in radians of a Gaussian, or the window
-        function b_l from l = 0 on. Results keep the beam; methods with priors need to know it.
+        function b_l from l = 0 on. Results keep the beam; spectra that are given are smoothed.
     output : {"fields", "derivatives", "potentials"}, default "fields"
         E and B; or N_l E_lm and N_l B_lm, second derivatives of Q and U; or E_lm / N_l and
         B_lm / N_l; N_l = sqrt((l+2)! / (l-2)!).

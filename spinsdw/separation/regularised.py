@@ -1,8 +1,8 @@
 r"""What the methods that fit E and B share: the prior, the noise, the solver, and the residual.
 
-With nothing given the prior is flat, :math:`\ell(\ell+1) C^E_\ell / 2\pi` constant and smoothed by
-the beam, and the noise is a small share of it: the fit then depends on neither scale, so that the
-unit of the map does not matter.
+With nothing given the prior is flat, :math:`\ell(\ell+1) C^E_\ell / 2\pi` constant, and the noise
+is a small share of it: the fit then depends on neither scale, so that the unit of the map does not
+matter.
 """
 
 from __future__ import annotations
