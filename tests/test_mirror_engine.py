@@ -122,3 +122,23 @@ def test_columns_have_the_same_bits_on_any_number_of_threads_and_in_any_batch(or
     for i in range(3):
         single = fill(engine, flm[i : i + 1], order_sums(bandlimit, order))
         assert np.array_equal(single[0], desired[i])
+
+
+@needs_compiler
+@pytest.mark.parametrize("order", [0, -2])
+def test_places_beyond_the_last_ring_stay_within_range_at_high_degree(order):
+    """<F f, g> = <f, F* g> on a few rings: a place to spare grew to infinity, and 0 * inf is NaN
+
+    At L = 1024 it did not yet, and at L = 2048 it did from degree 1467 on.
+    """
+    bandlimit, north = 2048, np.pi / 2 - np.array([0.3, 0.02, 0.01, 0.0])
+    engine, sums = MirrorEngine(bandlimit, north, order), order_sums(bandlimit, order, sides=1)
+    flm = random_flm(bandlimit, order)[None]
+    columns = fill(engine, flm, sums)
+    noise = random_like(columns, seed=1)
+    found = np.zeros_like(flm)
+    engine.add_to_harmonics(noise, sums, found)
+    assert np.isfinite(found).all()
+    scale = np.linalg.norm(columns) * np.linalg.norm(noise)
+    difference = np.vdot(columns, noise) - np.vdot(flm, found)
+    assert abs(difference) <= tolerance(bandlimit) * EPS * scale
