@@ -78,8 +78,8 @@ class MirrorEngine:
     @functools.cached_property
     def _rings(self) -> tuple[Array, ...]:
         sine, plus, minus, _ = self._belt.rings
-        # Places beyond the last ring, whose sums have no weight, are at the equator, where functions
-        # do not grow beyond the range of floats: 0 times infinity would be no zero.
+        # Places beyond the last ring, whose sums have no weight, are at the equator, where no
+        # function grows beyond the range of floats: 0 times infinity would be no zero.
         theta = np.full(sine.size, np.pi / 2)
         theta[: self._belt.colatitudes.size] = self._belt.colatitudes
         cosine = np.cos(theta)
