@@ -82,10 +82,10 @@ class ProjectionEstimator:
     survey: Survey
     fit: RegularisedFit
 
-    @functools.cached_property
+    @property
     def weights(self) -> dict[int | str, Array]:
         """Share of each wavelet's energy on the observed sky."""
-        return {key: 1.0 - share for key, share in self.survey.shares.items()}
+        return self.survey.seen_shares
 
     def estimate(self, p: Array) -> Estimate:
         """Separate maps, shape (batch, *map)."""

@@ -99,6 +99,11 @@ class Survey:
         holes = 1.0 - self.mask
         return energy_shares(self.transform, lambda size: self.sky.integrals(holes, size))
 
+    @functools.cached_property
+    def seen_shares(self) -> dict[int | str, Array]:
+        """Share of each wavelet's energy where the sky is observed: 1 minus `shares`."""
+        return {key: 1.0 - share for key, share in self.shares.items()}
+
     @property
     def sky_fraction(self) -> float:
         """Mean of the mask over the sphere."""

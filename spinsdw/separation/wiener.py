@@ -87,10 +87,10 @@ class WienerEstimator:
     survey: Survey
     fit: RegularisedFit
 
-    @functools.cached_property
+    @property
     def weights(self) -> dict[int | str, Array]:
         """Share of each wavelet's energy on the observed sky."""
-        return {key: 1.0 - share for key, share in self.survey.shares.items()}
+        return self.survey.seen_shares
 
     def _solver(self, p: Array) -> LeastSquares:
         chosen = self.fit.choices
