@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -189,7 +189,7 @@ class HybridEstimator:
         noise = draw_white(survey, method.draws, method.seed)
         p = survey.observed * survey.sky.polarisation_map(np.concatenate([drawn, noise]))
         p[len(drawn) :] /= np.sqrt(np.where(survey.weights > 0, survey.weights, 1.0))
-        parts, _ = self._parts(p, with_pure=True)
+        parts, _ = self._parts(self._drawn_fit, p, with_pure=True)
         truth = survey.transform.analysis_harmonic(np.concatenate([drawn, noise]))
         return {
             key: _regime(
@@ -216,11 +216,21 @@ class HybridEstimator:
             return {key: np.ones(share.shape) for key, share in shares.items()}
         return {key: regime.retained(shares[key]) for key, regime in self.regimes.items()}
 
-    def _parts(self, p: Array, *, with_pure: bool) -> tuple[_Parts, tuple[Convergence, ...]]:
+    @property
+    def _drawn_fit(self) -> RegularisedFit:
+        """The fit of the skies drawn: flat ones have no unit that a noise level could be in."""
+        choices = self.fit.choices
+        if choices.e_spectrum is not None or choices.noise_level is None:
+            return self.fit
+        return replace(self.fit, choices=replace(choices, noise_level=None))
+
+    def _parts(
+        self, fit: RegularisedFit, p: Array, *, with_pure: bool
+    ) -> tuple[_Parts, tuple[Convergence, ...]]:
         """Return the coefficients of fit, residual and pure residual, and how the fit went."""
         survey, analysis = self.survey, self.survey.transform.analysis_harmonic
-        plm, convergence = self.fit.fit(p)
-        left = self.fit.residual(p, plm)
+        plm, convergence = fit.fit(p)
+        left = fit.residual(p, plm)
         pure = None
         if with_pure and self._smooth_mask is not None:
             e_lm, _ = spin_to_eb(plm)
@@ -234,7 +244,7 @@ class HybridEstimator:
         if self.survey.mask is None:
             return separate_whole(self.survey, p)
         with_pure = any(regime.pure.any() for regime in self.regimes.values())
-        (fitted, left, pure), convergence = self._parts(p, with_pure=with_pure)
+        (fitted, left, pure), convergence = self._parts(self.fit, p, with_pure=with_pure)
         # E leaks nothing that matters into itself: all of its residual is kept.
         found = (fitted + left).map(np.real)
         b_parts = {}

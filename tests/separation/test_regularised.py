@@ -171,6 +171,20 @@ def test_noise_level_sets_the_scale_by_the_power_of_the_maps():
     assert abs(np.log10(ratio[0] / (25 / one))) <= 0.05 + 1e-9
 
 
+@needs_compiler
+def test_noise_level_in_any_unit_gives_the_same_regimes():
+    """A map in K with its noise in K is separated as the same map in uK"""
+    sky = HealpixSky(NSIDE, L)
+    mask, p = cap(sky), sky.polarisation_map(steep_eb(9)[0][0])
+    found = []
+    for unit in (1.0, 1e-6):
+        method = Hybrid(noise_level=1e-3 * unit, draws=2, max_iterations=20)
+        maps = EBSeparator(L, mask, method=method).separate(unit * p.real, unit * p.imag)
+        found.append((maps.E / unit, maps.weights[3]))
+    assert np.max(np.abs(found[1][0] - found[0][0])) < 1e-4 * np.max(np.abs(found[0][0]))
+    assert_close(found[1][1], found[0][1], ulps=1e6)
+
+
 def test_given_spectra_are_smoothed_by_the_beam():
     beam = np.exp(-0.01 * np.arange(17.0))
     survey = survey_of(HealpixSky(8, 17), beam=beam)
