@@ -254,7 +254,9 @@ def all_tables() -> str:
 def main() -> None:
     """Write docs/purity_tables.inc and the pictures from the results that are kept."""
     (DOCS / "purity_tables.inc").write_text(all_tables(), encoding="utf-8")
-    names = save_figures(read_results(_kept()[0]), DOCS / "_static")
+    # Pictures compare: they show the resolution at which most methods were judged.
+    results = max((read_results(name) for name in _kept()), key=len)
+    names = save_figures(results, DOCS / "_static")
     print(f"Wrote purity_tables.inc from {', '.join(_kept())} and {len(names)} pictures.")
 
 
