@@ -33,6 +33,9 @@ __all__ = ["Convergence", "EBPrior", "LeastSquares", "Observation"]
 
 Array = np.ndarray[Any, Any]
 
+# Maps fitted in step: more share little further work, and their arrays leave the caches.
+_STACK = 4
+
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
@@ -293,7 +296,12 @@ class LeastSquares:
         convergence : tuple of Convergence
             Steps, residuals and the sum minimised, for each map.
         """
-        return self.solve_whitened(self.observation.whiten(p))
+        fits = [
+            self.solve_whitened(self.observation.whiten(p[start : start + _STACK]))
+            for start in range(0, len(p), _STACK)
+        ]
+        plm = np.concatenate([found for found, _ in fits])
+        return plm, tuple(history for _, histories in fits for history in histories)
 
     def solve_whitened(self, values: Array) -> tuple[Array, tuple[Convergence, ...]]:
         """Fit stacks of values in units of the noise, as `Observation.whiten` makes them."""
