@@ -1,4 +1,4 @@
-"""The one decorator for compiled functions, numba's options, and where machine code is cached.
+"""The decorators of compiled functions, numba's options, and where machine code is cached.
 
 Why a cache of our own: numba's in-tree cache knows one source file, while a function here inlines
 helpers from its neighbours; a half-written or unreadable cache file makes numba raise at the first
@@ -23,7 +23,7 @@ import numba
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["cache_directory", "kernel"]
+__all__ = ["cache_directory", "inner", "kernel"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -188,7 +188,20 @@ class PackageCache(caching.FunctionCache):
 
 def kernel(function: Function) -> Function:
     """Compile on first call: no interpreter lock, numpy division, fused multiply-adds allowed."""
-    jitted = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
+    return _compile(function)
+
+
+def inner(function: Function) -> Function:
+    """Compile like `kernel` what kernels call for each block of rings: it must not allocate.
+
+    Numba counts references to arrays, for every slice as well, with atomic instructions: around the
+    short loops of a block they took as long as the loops. Here it does not.
+    """
+    return _compile(function, _nrt=False)
+
+
+def _compile(function: Function, **options: bool) -> Function:
+    jitted = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST, **options)(function)
     folder = None if config.DISABLE_JIT else cache_directory()
     if isinstance(jitted, Dispatcher) and folder is not None:
         jitted._cache = PackageCache(jitted.py_func, folder)

@@ -29,12 +29,12 @@ from __future__ import annotations
 
 import math
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner
 
 __all__ = ["fill_lowering", "fill_parity_recursion", "lower_order", "raise_order"]
 
 
-@kernel
+@inner
 def fill_parity_recursion(m, count, ratios, a, b, shifted, scale):
     """Fill ratios[i] = e_{m+i}, i < 2 count + 2, and a_k, b_k, b_k + a_k, scale_k for k < count.
 
@@ -63,7 +63,7 @@ def fill_parity_recursion(m, count, ratios, a, b, shifted, scale):
         b[k] = -value * b[k]
 
 
-@kernel
+@inner
 def fill_lowering(m, size, stop, order_tables, factors):
     """Fill factors = U_l, V_l, W_l at n = size, for max(m, size) <= l < stop, and zero around.
 
@@ -88,7 +88,7 @@ def fill_lowering(m, size, stop, order_tables, factors):
         down[i] = math.sqrt(el * el - square_m) * below[i]
 
 
-@kernel
+@inner
 def lower_order(m, sign, stop, factors, series, lowered):
     """From c of sum_l c_l sin d^l_mn, l < stop, to that of sum_l lowered_l d^l_m,n-+1, l <= stop.
 
@@ -108,7 +108,7 @@ def lower_order(m, sign, stop, factors, series, lowered):
         out[count + 1] = 0.0
 
 
-@kernel
+@inner
 def raise_order(m, sign, stop, factors, series, raised):
     """Transpose of `lower_order`: from sums with d^l_m,n-+1, l <= stop, to those of sin d^l_mn."""
     up, here, down = factors[0, m:], factors[1, m:], factors[2, m:]

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner, kernel
 from spinsdw.compiled.legendre_recursion import (
     fill_lowering,
     fill_parity_recursion,
@@ -34,7 +34,7 @@ __all__ = ["add_mirrored_to_harmonics", "fill_mirrored_columns"]
 _LOOK = PADDING // 2
 
 
-@kernel
+@inner
 def _prepare_order(
     m, n, L, tables, rings, powers, is_new, window, recursion, mixers, factors, state, inside
 ):
@@ -73,7 +73,7 @@ def _prepare_order(
     return count
 
 
-@kernel
+@inner
 def _fill_series(m, side, n, L, factors, flm, weights, series):
     """Fill c_l of sum_l c_l d^l_m0 = sin^|n| F_n(+-m), m <= l < L + |n|; return which series."""
     size = abs(n)
@@ -97,7 +97,7 @@ def _fill_series(m, side, n, L, factors, flm, weights, series):
     return size & 1
 
 
-@kernel
+@inner
 def _fill_coefficients(m, count, series, mixers, c):
     """c[k] = (even, odd) sums' coefficients of u_k, each as real and imaginary part."""
     here, above, odd = mixers[0], mixers[1], mixers[2]
@@ -110,7 +110,7 @@ def _fill_coefficients(m, count, series, mixers, c):
     c[4 * count : 4 * (count + PADDING)] = 0.0
 
 
-@kernel
+@inner
 def _store_block(first, start, n_rings, sums, cosine, factor, column):
     """Write both hemispheres of a block of rings into a column."""
     count = min(RINGS, n_rings - start)
@@ -124,7 +124,7 @@ def _store_block(first, start, n_rings, sums, cosine, factor, column):
         south[count - 1 - r] = size[r] * (even - odd)
 
 
-@kernel
+@inner
 def _copy_state(state, start, u):
     for i in range(3):
         given, copy = state[i, start : start + RINGS], u[i]
@@ -132,7 +132,7 @@ def _copy_state(state, start, u):
             copy[r] = given[r]
 
 
-@kernel
+@inner
 def _arguments(start, rings, recursion):
     """Return the argument of the recursion that is exact on the block, and its shift."""
     is_polar = rings[0][start] < 0.7
@@ -156,24 +156,13 @@ def _series_workspace(L, n):
     return np.empty((3, size)), np.empty((abs(n), 3, size)), np.empty((2, 2, size))
 
 
-@kernel
-def fill_mirrored_columns(
-    first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, columns
+@inner
+def _fill_orders(
+    first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, room, columns
 ):
-    """Fill columns[i, m, ring] = sum_l weights[l] flm[i, lm] d^l_mn(theta), both hemispheres.
-
-    flm: (maps, L*L); weights: (L,) complex; rings: (sin, 1 + cos, 1 - cos, cos^2, -sin^2, cos,
-    sin^-|n|) of the northern rings from ``first_ring`` on and RINGS more; windows: (2, L) first
-    and last of them that matter at each m, others are left alone; tables: (sqrt(k), central
-    binomials, 1 / k, 1 / sqrt(2k + 1), (|n|, 3, L) the parts of U_l, V_l, W_l that depend on l and
-    n); columns: (maps, n_m, all rings), of m >= 0 only for ``sides`` = 1.
-    """
-    padded, n_m = rings[0].size, columns.shape[1]
-    n_rings = padded - RINGS
-    recursion, state, powers, inside = _workspace(L, n, padded)
-    u = np.empty((3, RINGS))
-    sums, c = np.empty(4 * RINGS), np.empty(4 * (L + abs(n) + PADDING))
-    mixers, factors, series = _series_workspace(L, n)
+    """Fill the columns of some orders; ``room`` is what `fill_mirrored_columns` allocates."""
+    (recursion, state, powers, inside), (mixers, factors, series), u, sums, c = room
+    n_rings, n_m = rings[0].size - RINGS, columns.shape[1]
     for m in range(first_m, stop_m):
         low, high = windows[0, m], windows[1, m]
         is_new = m == first_m or m % M_CHUNK == 0
@@ -220,6 +209,42 @@ def fill_mirrored_columns(
 
 
 @kernel
+def fill_mirrored_columns(
+    first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, columns
+):
+    """Fill columns[i, m, ring] = sum_l weights[l] flm[i, lm] d^l_mn(theta), both hemispheres.
+
+    flm: (maps, L*L); weights: (L,) complex; rings: (sin, 1 + cos, 1 - cos, cos^2, -sin^2, cos,
+    sin^-|n|) of the northern rings from ``first_ring`` on and RINGS more; windows: (2, L) first
+    and last of them that matter at each m, others are left alone; tables: (sqrt(k), central
+    binomials, 1 / k, 1 / sqrt(2k + 1), (|n|, 3, L) the parts of U_l, V_l, W_l that depend on l and
+    n); columns: (maps, n_m, all rings), of m >= 0 only for ``sides`` = 1.
+    """
+    room = (
+        _workspace(L, n, rings[0].size),
+        _series_workspace(L, n),
+        np.empty((3, RINGS)),
+        np.empty(4 * RINGS),
+        np.empty(4 * (L + abs(n) + PADDING)),
+    )
+    _fill_orders(
+        first_m,
+        stop_m,
+        L,
+        sides,
+        n,
+        first_ring,
+        flm,
+        weights,
+        rings,
+        windows,
+        tables,
+        room,
+        columns,
+    )
+
+
+@inner
 def _load_block(first, start, n_rings, column, cosine, factor, g):
     """Split a block of a column into its even and its odd part, zero beyond the last ring."""
     total = column.size
@@ -239,7 +264,7 @@ def _load_block(first, start, n_rings, column, cosine, factor, g):
         g[3 * RINGS + r] = odd.imag
 
 
-@kernel
+@inner
 def _collect(m, count, sums, mixers, series):
     """Fill sum_ring d^l_m0 g, m <= l < m + 2 count, from the lanes of the sums of u_k g."""
     here, above, odd = mixers[0], mixers[1], mixers[2]
@@ -254,7 +279,7 @@ def _collect(m, count, sums, mixers, series):
             before = above[k] * even
 
 
-@kernel
+@inner
 def _add_series(m, side, n, L, factors, series, weights, flm):
     """Transpose of `_fill_series`: add what ``series`` holds for order 0 to the coefficients."""
     size = abs(n)
@@ -272,19 +297,13 @@ def _add_series(m, side, n, L, factors, series, weights, flm):
         place += 2 * (first + i + 1)
 
 
-@kernel
-def add_mirrored_to_harmonics(
-    first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, flm
+@inner
+def _add_orders(
+    first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, room, flm
 ):
-    """flm[i, lm] += weights[l] sum_ring d^l_mn(theta) columns[i, m, ring], both hemispheres.
-
-    Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
-    """
+    """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
+    (recursion, state, powers, inside), (mixers, factors, series), u, g, masked, sums = room
     padded, n_m = rings[0].size, columns.shape[1]
-    recursion, state, powers, inside = _workspace(L, n, padded)
-    u, g, masked = np.empty((3, RINGS)), np.empty(4 * RINGS), np.empty(4 * RINGS)
-    sums = np.empty(4 * WIDTH * (L + abs(n) + PADDING))
-    mixers, factors, series = _series_workspace(L, n)
     for m in range(first_m, stop_m):
         is_new = m == first_m or m % M_CHUNK == 0
         count = _prepare_order(
@@ -330,3 +349,36 @@ def add_mirrored_to_harmonics(
                     )
                 _collect(m, count, sums, mixers, series[0])
                 _add_series(m, side, n, L, factors, series, weights, flm[i])
+
+
+@kernel
+def add_mirrored_to_harmonics(
+    first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, flm
+):
+    """flm[i, lm] += weights[l] sum_ring d^l_mn(theta) columns[i, m, ring], both hemispheres.
+
+    Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
+    """
+    room = (
+        _workspace(L, n, rings[0].size),
+        _series_workspace(L, n),
+        np.empty((3, RINGS)),
+        np.empty(4 * RINGS),
+        np.empty(4 * RINGS),
+        np.empty(4 * WIDTH * (L + abs(n) + PADDING)),
+    )
+    _add_orders(
+        first_m,
+        stop_m,
+        L,
+        sides,
+        n,
+        first_ring,
+        columns,
+        weights,
+        rings,
+        windows,
+        tables,
+        room,
+        flm,
+    )

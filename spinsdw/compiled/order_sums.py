@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner, kernel
 from spinsdw.compiled.ring_sums import add_block_to_degrees, sum_block
 from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
 from spinsdw.compiled.wigner_recursion import (
@@ -35,7 +35,7 @@ __all__ = ["M_CHUNK", "add_columns_to_harmonics", "fill_columns"]
 M_CHUNK = 16
 
 
-@kernel
+@inner
 def _series_sign(sigma, mirrored, m, n):
     """Return (constant sign, whether (-1)^l is a factor) of the table above."""
     direct = 0 if sigma > 0 else m - n
@@ -44,13 +44,13 @@ def _series_sign(sigma, mirrored, m, n):
     return (-1.0 if exponent & 1 else 1.0), mirrored == 1
 
 
-@kernel
+@inner
 def _is_active(run, slot, m, sides):
     i, sigma = run[1 + 3 * slot], run[2 + 3 * slot]
     return i >= 0 and (sigma > 0 or (m > 0 and sides == 2))
 
 
-@kernel
+@inner
 def _gather(m, L, flm, gathered):
     """gathered[source, side, l] = f_{l, +-m}, next to each other for neighbouring degrees."""
     for source in range(flm.shape[0]):
@@ -60,7 +60,7 @@ def _gather(m, L, flm, gathered):
                 gathered[source, side, el] = flm[source, el * el + el + signed_m]
 
 
-@kernel
+@inner
 def _fill_coefficients(run, slot, k, columns, m, L, lowest, gathered, weights, scale, c):
     """c[l, k] + i c[l, k + 1] = sign_l scale_l weight_l f_{l, sigma m} for one series."""
     n, i, sigma, mirrored = run[0], run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
@@ -81,7 +81,7 @@ def _fill_coefficients(run, slot, k, columns, m, L, lowest, gathered, weights, s
         c[el * columns + k + 1] = 0.0
 
 
-@kernel
+@inner
 def _shift_argument(first, L, a, b, north, south):
     """Rewrite a cos + b as a (cos - 1) + north and a (cos + 1) + south.
 
@@ -97,7 +97,7 @@ def _shift_argument(first, L, a, b, north, south):
         south[el] = 0.0
 
 
-@kernel
+@inner
 def _store_block(run, slot, k, start, sums, series):
     target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
     for r in range(RINGS):
@@ -105,7 +105,7 @@ def _store_block(run, slot, k, start, sums, series):
         target[1, start + r] = sums[(k + 1) * RINGS + r]
 
 
-@kernel
+@inner
 def _clear(run, slot, low, high, series):
     """Set to zero what a run does not compute: rings before ``low`` and from ``high`` on."""
     target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
@@ -114,7 +114,7 @@ def _clear(run, slot, low, high, series):
         target[part, high:] = 0.0
 
 
-@kernel
+@inner
 def _mix_series(m, n_rings, mixing, series, mixed, columns):
     """columns[k, +-m, ring] = sum_i mixing[k, i] series[i]; a mirrored ring counts from the end."""
     n_out, n_orders = mixing.shape
@@ -138,7 +138,7 @@ def _mix_series(m, n_rings, mixing, series, mixed, columns):
                         out[total - 1 - r] = complex(mixed[0, r], mixed[1, r])
 
 
-@kernel
+@inner
 def _prepare_recursion(m, n, L, is_opposite, tables, recursion):
     """Fill a, b and both shifted arguments; ``is_opposite`` if -n was the order before."""
     a, b, scale, north, south = recursion
@@ -152,31 +152,37 @@ def _prepare_recursion(m, n, L, is_opposite, tables, recursion):
 
 
 @kernel
-def fill_columns(
-    first_m, stop_m, L, lowest, sides, flm, weights, runs, mixing, rings, windows, tables, columns
-):
-    """Fill columns[k, m, ring] = sum_i mixing[k, i] sum_l weights[i, l] f_lm d^l_{m, n_i}(theta).
-
-    flm: (1 or orders, L*L); weights: (orders, L) complex; mixing: (outputs, orders) complex;
-    rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows: (2, L)
-    first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k); columns:
-    (outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
-    """
-    n_orders, n_runs = weights.shape[0], runs.shape[0]
-    mirrored = max(runs[:, 3].max(), runs[:, 6].max())
-    padded = rings[0].size
-    recursion = (
+def _recursion_room(L):
+    """Return a, b, the scale and both shifted arguments of `_prepare_recursion`, not filled."""
+    return (
         np.empty(L + PADDING),
         np.empty(L),
         np.empty(L + 1),
         np.empty(L + PADDING),
         np.empty(L + PADDING),
     )
-    c, sums, state = np.empty(4 * (L + PADDING)), np.empty(4 * RINGS), np.empty((4, RINGS))
-    powers = np.empty((n_runs, 4, padded))
-    gathered = np.empty((flm.shape[0], sides, L), dtype=np.complex128)
-    series = np.zeros((n_orders, sides, mirrored + 1, 2, padded))
-    mixed = np.empty((2, padded))
+
+
+@inner
+def _fill_orders(
+    first_m,
+    stop_m,
+    L,
+    lowest,
+    sides,
+    flm,
+    weights,
+    runs,
+    mixing,
+    rings,
+    windows,
+    tables,
+    room,
+    columns,
+):
+    """Fill the columns of some orders; ``room`` is what `fill_columns` allocates."""
+    recursion, c, sums, state, powers, gathered, series, mixed = room
+    n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
         _gather(m, L, flm, gathered)
         low, high = windows[0, m], windows[1, m]
@@ -236,6 +242,48 @@ def fill_columns(
 
 
 @kernel
+def fill_columns(
+    first_m, stop_m, L, lowest, sides, flm, weights, runs, mixing, rings, windows, tables, columns
+):
+    """Fill columns[k, m, ring] = sum_i mixing[k, i] sum_l weights[i, l] f_lm d^l_{m, n_i}(theta).
+
+    flm: (1 or orders, L*L); weights: (orders, L) complex; mixing: (outputs, orders) complex;
+    rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows: (2, L)
+    first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k); columns:
+    (outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
+    """
+    n_orders, n_runs = weights.shape[0], runs.shape[0]
+    mirrored = max(runs[:, 3].max(), runs[:, 6].max())
+    padded = rings[0].size
+    room = (
+        _recursion_room(L),
+        np.empty(4 * (L + PADDING)),
+        np.empty(4 * RINGS),
+        np.empty((4, RINGS)),
+        np.empty((n_runs, 4, padded)),
+        np.empty((flm.shape[0], sides, L), dtype=np.complex128),
+        np.zeros((n_orders, sides, mirrored + 1, 2, padded)),
+        np.empty((2, padded)),
+    )
+    _fill_orders(
+        first_m,
+        stop_m,
+        L,
+        lowest,
+        sides,
+        flm,
+        weights,
+        runs,
+        mixing,
+        rings,
+        windows,
+        tables,
+        room,
+        columns,
+    )
+
+
+@inner
 def _load_block(run, slot, k, m, start, n_rings, columns, g):
     """Copy one series' rings of order sigma m into g, zero beyond the last ring."""
     i, sigma, mirrored = run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
@@ -251,7 +299,7 @@ def _load_block(run, slot, k, m, start, n_rings, columns, g):
         g[(k + 1) * RINGS + r] = value.imag
 
 
-@kernel
+@inner
 def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm):
     """f_{l, sigma m} += sign_l scale_l weight_l times the summed lanes of one series."""
     n, i, sigma, mirrored = run[0], run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
@@ -266,27 +314,13 @@ def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm
         flm[target, el * el + el + sigma * m] += factor * weights[i, el] * value
 
 
-@kernel
-def add_columns_to_harmonics(
-    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, flm
+@inner
+def _add_orders(
+    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
 ):
-    """f_lm += sum_i weights[i, l] sum_ring d^l_{m, n_i}(theta) columns[i, m, ring].
-
-    columns: (at least orders, n_m, all rings); flm: (1 or orders, L*L); the rest as in
-    `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
-    """
-    n_runs = runs.shape[0]
-    padded = rings[0].size
-    recursion = (
-        np.empty(L + PADDING),
-        np.empty(L),
-        np.empty(L + 1),
-        np.empty(L + PADDING),
-        np.empty(L + PADDING),
-    )
-    sums = np.empty(4 * WIDTH * (L + PADDING))
-    g, masked, state = np.empty(4 * RINGS), np.empty(4 * RINGS), np.empty((4, RINGS))
-    powers = np.empty((n_runs, 4, padded))
+    """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
+    recursion, sums, g, masked, state, powers = room
+    n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
         filled = 2 * L
         for j in range(n_runs):
@@ -336,3 +370,25 @@ def add_columns_to_harmonics(
                 if _is_active(run, slot, m, sides):
                     k = columns_used - 2 if slot == 1 else 0
                     _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm)
+
+
+@kernel
+def add_columns_to_harmonics(
+    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, flm
+):
+    """f_lm += sum_i weights[i, l] sum_ring d^l_{m, n_i}(theta) columns[i, m, ring].
+
+    columns: (at least orders, n_m, all rings); flm: (1 or orders, L*L); the rest as in
+    `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
+    """
+    room = (
+        _recursion_room(L),
+        np.empty(4 * WIDTH * (L + PADDING)),
+        np.empty(4 * RINGS),
+        np.empty(4 * RINGS),
+        np.empty((4, RINGS)),
+        np.empty((runs.shape[0], 4, rings[0].size)),
+    )
+    _add_orders(
+        first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
+    )

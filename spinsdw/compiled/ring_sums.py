@@ -8,7 +8,7 @@ called from one place only: every call is another copy of its machine code.
 
 from __future__ import annotations
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner
 from spinsdw.compiled.vectors import (
     RINGS,
     add_to_degrees_2,
@@ -22,7 +22,7 @@ from spinsdw.compiled.wigner_recursion import rescale
 __all__ = ["add_block_to_degrees", "sum_block"]
 
 
-@kernel
+@inner
 def _clear_outside(scale, columns, sums):
     """Forget what rings out of range have collected: their u is scaled, so it was no sum."""
     for r in range(RINGS):
@@ -31,7 +31,7 @@ def _clear_outside(scale, columns, sums):
                 sums[k * RINGS + r] = 0.0
 
 
-@kernel
+@inner
 def _mask_outside(scale, columns, g, masked):
     """Copy the block's columns with zeros where a ring is out of range."""
     for r in range(RINGS):
@@ -40,7 +40,7 @@ def _mask_outside(scale, columns, g, masked):
             masked[k * RINGS + r] = factor * g[k * RINGS + r]
 
 
-@kernel
+@inner
 def _next_pairs(el, lowest, L, look, is_inside, is_silent):
     """Return how many pairs of degrees the next call takes."""
     if not is_inside:
@@ -48,7 +48,7 @@ def _next_pairs(el, lowest, L, look, is_inside, is_silent):
     return (lowest - el) // 2 if is_silent else (L - el + 1) // 2
 
 
-@kernel
+@inner
 def sum_block(first, lowest, L, columns, look, inside, a, b, c, x, before, now, scale, sums):
     """sums[k, r] = sum_{l=first}^{L-1} c[l, k] u_l(x_r); c is zero below ``lowest``.
 
@@ -76,7 +76,7 @@ def sum_block(first, lowest, L, columns, look, inside, a, b, c, x, before, now, 
         el += 2 * pairs
 
 
-@kernel
+@inner
 def add_block_to_degrees(
     first, lowest, L, columns, look, inside, a, b, g, masked, x, before, now, scale, sums
 ):

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner
 
 __all__ = [
     "PADDING",
@@ -51,7 +51,7 @@ _RENORM = 2.0**256
 _UNRENORM = 2.0**-256
 
 
-@kernel
+@inner
 def fill_recursion(m, n, L, root, inverse, a, b, scale):
     """Fill a_l, b_l, scale_l, max(m, |n|) <= l < L, from root[k] = sqrt(k), inverse[k] = 1 / k."""
     n_abs = abs(n)
@@ -77,7 +77,7 @@ def fill_recursion(m, n, L, root, inverse, a, b, scale):
         b[el] = -value * mn * inverse[el] * inverse[el + 1]
 
 
-@kernel
+@inner
 def fill_powers(base, exponent, mantissa, power):
     """Fill mantissa * 2**power = base**exponent, element by element; base in [0, 2]."""
     for r in range(base.size):
@@ -106,7 +106,7 @@ def fill_powers(base, exponent, mantissa, power):
             k >>= 1
 
 
-@kernel
+@inner
 def multiply_powers(base, mantissa, power):
     """Raise the exponent of `fill_powers` by one, for a base in [0, 1]."""
     for r in range(base.size):
@@ -116,7 +116,7 @@ def multiply_powers(base, mantissa, power):
         power[r] -= 256.0 if small else 0.0
 
 
-@kernel
+@inner
 def start_norm(M, K, central):
     """Return (v, e): v 2**e = sqrt(binom(2M, M + K) / 4**M), central[M] = binom(2M, M) / 4**M."""
     value, power = central[M], 0.0
@@ -128,7 +128,7 @@ def start_norm(M, K, central):
     return math.sqrt(value), power
 
 
-@kernel
+@inner
 def _fill_order_powers(m, n, rings, powers):
     """Fill sin(theta)^(M - |K|) and (1 +- cos(theta))^|K|: all of d^M_mn that depends on theta."""
     sine, plus, minus = rings[0], rings[1], rings[2]
@@ -137,7 +137,7 @@ def _fill_order_powers(m, n, rings, powers):
     fill_powers(plus if n >= 0 else minus, min(m, n_abs), powers[2], powers[3])
 
 
-@kernel
+@inner
 def prepare_powers(m, n, is_new, rings, powers):
     """Bring the powers to m, from m - 1 unless ``is_new``."""
     if is_new or m <= abs(n):
@@ -146,7 +146,7 @@ def prepare_powers(m, n, is_new, rings, powers):
         multiply_powers(rings[0], powers[0], powers[1])
 
 
-@kernel
+@inner
 def signed_norm(m, n, central):
     """Return the factor of the closed form of d^M_mn that does not depend on theta."""
     n_abs = abs(n)
@@ -159,7 +159,7 @@ def signed_norm(m, n, central):
     return (-value if odd else value), power
 
 
-@kernel
+@inner
 def _fill_small_start(power, now, scale):
     """Give rings their exponents: now holds the mantissas, the true values are now 2**power.
 
@@ -180,7 +180,7 @@ def _fill_small_start(power, now, scale):
     return inside
 
 
-@kernel
+@inner
 def fill_start(norm, norm_power, powers, first, before, now, scale, power):
     """Set u_{l0-1} = 0, u_{l0} and the exponents of the rings from ``first`` on.
 
@@ -204,7 +204,7 @@ def fill_start(norm, norm_power, powers, first, before, now, scale, power):
     return _fill_small_start(power, now, scale) if small > 0 else now.size
 
 
-@kernel
+@inner
 def rescale(before, now, scale):
     """Bring rings that have grown back into range; return how many are in range."""
     inside = 0
