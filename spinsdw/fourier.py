@@ -17,6 +17,8 @@ import numpy as np
 __all__ = [
     "fill_maps",
     "fill_maps_columns",
+    "fill_orders",
+    "fill_rings",
     "from_modes",
     "from_orders",
     "from_series",
@@ -62,6 +64,25 @@ def from_orders(spectrum: Array, out: Array) -> None:
 def to_orders(values: Array, out: Array) -> None:
     """Fill ``out[n, ...] = sum_k values[k, ...] exp(-2 pi i n k / K)``; as `to_series`."""
     _forward(values, out, 0)
+
+
+def fill_rings(orders: Array, pixels: Array, sizes: Array, phis: Array, starts: Array) -> None:
+    """Fill rings of any lengths of real maps, many in one call.
+
+    ``pixels[c, starts[r] + p] = sum_m orders[c, r, m] exp(i m (phis[r] + 2 pi p / sizes[r]))``,
+    over m and -m with conjugates there; sizes and starts: uint64.
+    """
+    import ducc0
+
+    ducc0.sht.leg2map(leg=orders, map=pixels, nphi=sizes, phi0=phis, ringstart=starts)
+
+
+def fill_orders(pixels: Array, orders: Array, sizes: Array, phis: Array, starts: Array) -> None:
+    """Fill ``orders[c, r, m]`` with the adjoint of `fill_rings`, conjugates left out."""
+    import ducc0
+
+    geometry = {"nphi": sizes, "phi0": phis, "ringstart": starts}
+    ducc0.sht.map2leg(map=pixels, leg=orders, mmax=orders.shape[2] - 1, **geometry)
 
 
 def from_modes(modes: Array, points: Array, accuracy: float, threads: int) -> Array:

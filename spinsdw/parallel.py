@@ -9,8 +9,9 @@ from __future__ import annotations
 import functools
 import operator
 import os
+from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 from spinsdw.errors import ParameterError
 
@@ -56,15 +57,40 @@ def threads_for(bandlimit: int, threads: int) -> int:
 @functools.cache
 def _executor(process: int, threads: int) -> ThreadPoolExecutor:
     # Keyed by process: threads do not survive a fork.
-    return ThreadPoolExecutor(threads, thread_name_prefix=f"spinsdw-{process}")
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix=f"spinsdw-{process}")
 
 
 def run_tasks(tasks: Iterable[Callable[[], None]], threads: int) -> None:
-    """Call every task, on ``threads`` threads; the first exception is raised here."""
+    """Call every task, on ``threads`` threads; the first exception is raised here.
+
+    The caller is one of the threads: it does not wait for the others to wake up. Whoever has
+    finished a task takes the next, so the first ones should be the longest.
+    """
     if threads == 1:
         for task in tasks:
             task()
         return
-    pool = _executor(os.getpid(), threads)
-    for future in [pool.submit(task) for task in tasks]:
+    queue = deque(tasks)
+    helpers = min(threads, len(queue)) - 1
+    futures = [_executor(os.getpid(), threads).submit(_work, queue) for _ in range(helpers)]
+    try:
+        _work(queue)
+    finally:
+        started = [future for future in futures if not future.cancel()]
+        wait(started)
+    for future in started:
         future.result()
+
+
+def _work(queue: deque[Callable[[], None]]) -> None:
+    """Take tasks until there are none; after an exception there are none for anybody."""
+    while True:
+        try:
+            task = queue.popleft()
+        except IndexError:
+            return
+        try:
+            task()
+        except BaseException:
+            queue.clear()
+            raise

@@ -16,7 +16,7 @@ from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.mirror_engine import MirrorEngine
 from spinsdw.parallel import resolve_threads, run_tasks, threads_for
-from spinsdw.ring_blocks import RingBlock, mirror_engine, ring_blocks, task_bytes
+from spinsdw.ring_blocks import BeltBlock, CapBlock, mirror_engine, ring_blocks, task_bytes
 from spinsdw.ring_engine import OrderSums
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.signals import check_flag, check_map, check_spin, writable
@@ -168,7 +168,7 @@ class HealpixTransform:
         if self.max_memory is not None:
             self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
 
-    def _share_rings(self, call: Callable[[RingBlock], None]) -> None:
+    def _share_rings(self, call: Callable[[BeltBlock | CapBlock], None]) -> None:
         blocks = ring_blocks(self.nside, self.bandlimit, -self.spin)
         run_tasks([functools.partial(call, block) for block in blocks], self._threads)
 

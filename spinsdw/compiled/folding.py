@@ -8,6 +8,9 @@ mode -k is the conjugate of k.
 Orders are taken a few at a time: columns are read along rings and folded rings written along
 orders, and both stay in the first-level cache. Orders from ``limits[r]`` on are none of the ring's:
 they are neither read nor written.
+
+Rings that are all of different lengths are not folded here: `split_orders` hands their orders to a
+Fourier transform that folds them itself.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import numpy as np
 
 from spinsdw.compiled.jit import kernel
 
-__all__ = ["fill_folded", "fill_unfolded"]
+__all__ = ["fill_folded", "fill_unfolded", "join_orders", "split_orders"]
 
 _STRIDE = 64
 
@@ -169,3 +172,42 @@ def fill_unfolded(folded, rings, sizes, phis, limits, starts, is_real, columns):
                     )
                 else:
                     _take_modes(first, stop, i, ring, points, phases, place, start, folded, columns)
+
+
+@kernel
+def split_orders(columns, rings, limits, is_real, orders):
+    """Fill orders[., r, m] of the real maps that some rings of columns hold.
+
+    A real map is one of them; a complex one two, its real and its imaginary part.
+    """
+    n_m = columns.shape[1]
+    for i in range(columns.shape[0]):
+        for m in range(orders.shape[2]):
+            for r in range(rings.size):
+                value, opposite = 0.0j, 0.0j
+                if m < limits[r]:
+                    value = columns[i, m, rings[r]]
+                    opposite = columns[i, (n_m - m) % n_m, rings[r]].conjugate()
+                if is_real:
+                    orders[i, r, m] = value if m > 0 else complex(value.real, 0.0)
+                else:
+                    orders[2 * i, r, m] = 0.5 * (value + opposite)
+                    orders[2 * i + 1, r, m] = -0.5j * (value - opposite)
+
+
+@kernel
+def join_orders(orders, rings, limits, is_real, columns):
+    """Fill some rings of columns from the orders of their real maps: adjoint of `split_orders`."""
+    n_m = columns.shape[1]
+    for i in range(columns.shape[0]):
+        for m in range(orders.shape[2]):
+            for r in range(rings.size):
+                if m >= limits[r]:
+                    continue
+                if is_real:
+                    columns[i, m, rings[r]] = orders[i, r, m]
+                else:
+                    value, other = orders[2 * i, r, m], 1j * orders[2 * i + 1, r, m]
+                    columns[i, m, rings[r]] = value + other
+                    if m > 0:
+                        columns[i, n_m - m, rings[r]] = (value - other).conjugate()
