@@ -66,7 +66,9 @@ class BeltBlock:
     def _rows(self, pixels: Array) -> Array:
         return pixels[:, self.pixels].reshape(len(pixels), self.rings.size, self.points)
 
-    def _modes(self, maps: int, is_real: bool) -> tuple[Array, tuple[Any, ...]]:
+    def _modes(
+        self, maps: int, is_real: bool
+    ) -> tuple[Array, tuple[Array, Array, Array, Array, Array]]:
         """Return room for the modes of all maps, and what tells where they lie."""
         count = self.points // 2 + 1 if is_real else self.points
         modes = np.empty((maps, self.rings.size, count), dtype=np.complex128)
