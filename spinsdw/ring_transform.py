@@ -25,7 +25,9 @@ __all__ = ["HealpixTransform"]
 
 Array = np.ndarray[Any, Any]
 
-# Bytes of the Fourier columns of the maps that go through the sums together.
+# Maps that go through the sums together, and bytes of their Fourier columns: with more maps values
+# made once save little more, and columns leave the cache.
+_MOST_MAPS = 4
 _COLUMN_BYTES = 2**26
 
 
@@ -158,7 +160,7 @@ class HealpixTransform:
         maps = batch * self.rings.n_pixels * np.dtype(self._maps_dtype).itemsize
         together = min(batch, self._maps_together)
         columns = 16 * together * math.prod(self._columns_shape)
-        working = columns + self._threads * together * task_bytes(self.nside)
+        working = columns + self._threads * task_bytes(self.nside)
         return {
             "synthesis": MemoryEstimate(flm, maps, working),
             "adjoint_synthesis": MemoryEstimate(maps, flm, working),
@@ -168,14 +170,18 @@ class HealpixTransform:
         if self.max_memory is not None:
             self.memory_estimate(math.prod(batch))[call].require(self.max_memory, call)
 
-    def _share_rings(self, call: Callable[[BeltBlock | CapBlock], None]) -> None:
+    def _share_rings(self, call: Callable[[BeltBlock | CapBlock, slice], None], maps: int) -> None:
+        """Call for every block of every map: the modes of one fit a core's cache."""
         blocks = ring_blocks(self.nside, self.bandlimit, -self.spin)
-        run_tasks([functools.partial(call, block) for block in blocks], self._threads)
+        places = [slice(i, i + 1) for i in range(maps)]
+        tasks = [functools.partial(call, block, one) for block in blocks for one in places]
+        run_tasks(tasks, self._threads)
 
     @property
     def _maps_together(self) -> int:
         """Maps that go through the sums at once: they share recursions, and add up in memory."""
-        return max(1, _COLUMN_BYTES // (16 * math.prod(self._columns_shape)))
+        fitting = _COLUMN_BYTES // (16 * math.prod(self._columns_shape))
+        return min(_MOST_MAPS, max(1, fitting))
 
     def _parts(self, maps: int) -> list[slice]:
         step = self._maps_together
@@ -184,11 +190,11 @@ class HealpixTransform:
     def _fill_maps(self, flm: Array, maps: Array) -> None:
         columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
         self._engine.fill_columns(flm, self._sums, columns)
-        self._share_rings(lambda block: block.fill_pixels(columns, maps))
+        self._share_rings(lambda block, i: block.fill_pixels(columns[i], maps[i]), len(maps))
 
     def _add_coefficients(self, maps: Array, flm: Array) -> None:
         columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
-        self._share_rings(lambda block: block.fill_columns(maps, columns))
+        self._share_rings(lambda block, i: block.fill_columns(maps[i], columns[i]), len(maps))
         self._engine.add_to_harmonics(columns, self._sums, flm)
 
     def synthesis(self, flm: Array) -> Array:

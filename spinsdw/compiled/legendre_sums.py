@@ -24,7 +24,15 @@ from spinsdw.compiled.legendre_recursion import (
     raise_order,
 )
 from spinsdw.compiled.order_sums import M_CHUNK
-from spinsdw.compiled.ring_sums import add_block_to_degrees, sum_block
+from spinsdw.compiled.ring_sums import (
+    CHUNK,
+    add_block_to_degrees,
+    add_quartets_to_degrees,
+    copy_rows,
+    copy_sums,
+    sum_block,
+    sum_quartets,
+)
 from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
 from spinsdw.compiled.wigner_recursion import PADDING, fill_start, prepare_powers, signed_norm
 
@@ -111,33 +119,30 @@ def _fill_coefficients(m, count, series, mixers, c):
 
 
 @inner
-def _store_block(first, start, n_rings, sums, cosine, factor, column):
-    """Write both hemispheres of a block of rings into a column."""
-    count = min(RINGS, n_rings - start)
-    north = column[first + start : first + start + count]
-    south = column[column.size - first - start - count : column.size - first - start]
-    x, size = cosine[start : start + count], factor[start : start + count]
+def _store_rows(first, low, stop, rows, cosine, factor, column):
+    """Write both hemispheres of rings low <= r < stop into a column."""
+    count = stop - low
+    north = column[first + low : first + stop]
+    south = column[column.size - first - stop : column.size - first - low]
+    x, size, part = cosine[low:stop], factor[low:stop], rows[:, low:stop]
     for r in range(count):
-        even = complex(sums[r], sums[RINGS + r])
-        odd = x[r] * complex(sums[2 * RINGS + r], sums[3 * RINGS + r])
+        even = complex(part[0, r], part[1, r])
+        odd = x[r] * complex(part[2, r], part[3, r])
         north[r] = size[r] * (even + odd)
         south[count - 1 - r] = size[r] * (even - odd)
 
 
 @inner
-def _copy_state(state, start, u):
-    for i in range(3):
-        given, copy = state[i, start : start + RINGS], u[i]
-        for r in range(RINGS):
-            copy[r] = given[r]
-
-
-@inner
-def _arguments(start, rings, recursion):
-    """Return the argument of the recursion that is exact on the block, and its shift."""
+def _load_state(state, rings, start, work):
+    """Bring a block's start and argument to ``work``; return whether the argument is -sin^2."""
     is_polar = rings[0][start] < 0.7
     x = rings[4] if is_polar else rings[3]
-    return x[start : start + RINGS], recursion[2] if is_polar else recursion[1]
+    for r in range(RINGS):
+        work[r] = state[0, start + r]
+        work[RINGS + r] = state[1, start + r]
+        work[2 * RINGS + r] = state[2, start + r]
+        work[3 * RINGS + r] = x[start + r]
+    return is_polar
 
 
 @kernel
@@ -156,13 +161,35 @@ def _series_workspace(L, n):
     return np.empty((3, size)), np.empty((abs(n), 3, size)), np.empty((2, 2, size))
 
 
+@kernel
+def _quartets(count, padded):
+    """Return where the rows of each quartet begin, the rows of all, and room for a block.
+
+    A quartet is the even and the odd sum, both complex, of one side of one map.
+    """
+    places = np.empty((count, 2), dtype=np.int64)
+    for q in range(count):
+        places[q, 0] = 4 * q * padded
+        places[q, 1] = (4 * q + 2) * padded
+    return places, np.empty((count, 4, padded)), np.empty(5 * RINGS), np.empty(CHUNK * RINGS)
+
+
+@inner
+def _end_of_blocks(low, high):
+    """Return one past the last ring of the blocks that cover low <= r < high."""
+    return low + max(high - low + RINGS - 1, 0) // RINGS * RINGS
+
+
 @inner
 def _fill_orders(
     first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, room, columns
 ):
     """Fill the columns of some orders; ``room`` is what `fill_mirrored_columns` allocates."""
-    (recursion, state, powers, inside), (mixers, factors, series), u, sums, c = room
-    n_rings, n_m = rings[0].size - RINGS, columns.shape[1]
+    (recursion, state, powers, inside), (mixers, factors, series), quartets, flat, sums, c = room
+    places, rows, work, values = quartets
+    x = work[3 * RINGS : 4 * RINGS]
+    padded, n_m = rings[0].size, columns.shape[1]
+    n_rings = padded - RINGS
     for m in range(first_m, stop_m):
         low, high = windows[0, m], windows[1, m]
         is_new = m == first_m or m % M_CHUNK == 0
@@ -181,31 +208,56 @@ def _fill_orders(
             state,
             inside,
         )
-        for i in range(flm.shape[0]):
-            for side in range(sides if m > 0 else 1):
-                last = _fill_series(m, side, n, L, factors, flm[i], weights, series)
-                _fill_coefficients(m, count, series[last], mixers, c)
-                column = columns[i, m if side == 0 else n_m - m]
-                for start in range(low, high, RINGS):
-                    x, shift = _arguments(start, rings, recursion)
-                    _copy_state(state, start, u)
-                    sum_block(
-                        0,
-                        0,
-                        count,
-                        4,
-                        _LOOK,
-                        inside[(start - low) // RINGS],
-                        recursion[0],
-                        shift,
-                        c,
-                        x,
-                        u[0],
-                        u[1],
-                        u[2],
-                        sums,
-                    )
-                    _store_block(first_ring, start, n_rings, sums, rings[5], rings[6], column)
+        n_sides = sides if m > 0 else 1
+        used = n_sides * flm.shape[0]
+        for q in range(used):
+            last = _fill_series(m, q % n_sides, n, L, factors, flm[q // n_sides], weights, series)
+            _fill_coefficients(m, count, series[last], mixers, c[q])
+        used_places = places[:used]
+        rows[:used] = 0.0
+        for start in range(low, high, RINGS):
+            is_polar = _load_state(state, rings, start, work)
+            shift = recursion[2] if is_polar else recursion[1]
+            reached = inside[(start - low) // RINGS]
+            if used == 1:
+                sum_block(
+                    0,
+                    0,
+                    count,
+                    4,
+                    _LOOK,
+                    reached,
+                    recursion[0],
+                    shift,
+                    c[0],
+                    x,
+                    work[:RINGS],
+                    work[RINGS : 2 * RINGS],
+                    work[2 * RINGS : 3 * RINGS],
+                    sums,
+                )
+                copy_sums(sums, 4, start, used_places, padded, flat)
+            else:
+                sum_quartets(
+                    0,
+                    0,
+                    count,
+                    _LOOK,
+                    reached,
+                    start,
+                    used_places,
+                    padded,
+                    recursion[0],
+                    shift,
+                    c,
+                    work,
+                    values,
+                    rows,
+                )
+        stop = min(_end_of_blocks(low, high), n_rings)
+        for q in range(used):
+            column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
+            _store_rows(first_ring, low, stop, rows[q], rings[5], rings[6], column)
 
 
 @kernel
@@ -220,12 +272,14 @@ def fill_mirrored_columns(
     binomials, 1 / k, 1 / sqrt(2k + 1), (|n|, 3, L) the parts of U_l, V_l, W_l that depend on l and
     n); columns: (maps, n_m, all rings), of m >= 0 only for ``sides`` = 1.
     """
+    quartets = _quartets(sides * flm.shape[0], rings[0].size)
     room = (
         _workspace(L, n, rings[0].size),
         _series_workspace(L, n),
-        np.empty((3, RINGS)),
+        quartets,
+        quartets[1].reshape(-1),
         np.empty(4 * RINGS),
-        np.empty(4 * (L + abs(n) + PADDING)),
+        np.empty((sides * flm.shape[0], 4 * (L + abs(n) + PADDING))),
     )
     _fill_orders(
         first_m,
@@ -245,23 +299,29 @@ def fill_mirrored_columns(
 
 
 @inner
-def _load_block(first, start, n_rings, column, cosine, factor, g):
-    """Split a block of a column into its even and its odd part, zero beyond the last ring."""
-    total = column.size
-    for r in range(RINGS):
-        ring = start + r
-        north, south, x = 0.0j, 0.0j, 0.0
-        if ring < n_rings:
-            x = cosine[ring]
-            north = factor[ring] * column[first + ring]
-            # The equator is its own mirror image: it counts once.
-            if 2 * (first + ring) + 1 != total:
-                south = factor[ring] * column[total - 1 - first - ring]
-        even, odd = north + south, x * (north - south)
-        g[r] = even.real
-        g[RINGS + r] = even.imag
-        g[2 * RINGS + r] = odd.real
-        g[3 * RINGS + r] = odd.imag
+def _load_rows(first, low, stop, n_rings, column, cosine, factor, rows):
+    """Split rings low <= r < stop of a column into even and odd parts, zero beyond the last."""
+    total, last = column.size, min(stop, n_rings)
+    count = last - low
+    north = column[first + low : first + last]
+    south = column[total - first - last : total - first - low]
+    x, size, part = cosine[low:last], factor[low:last], rows[:, low:stop]
+    for r in range(count):
+        here, mirrored = size[r] * north[r], size[r] * south[count - 1 - r]
+        even, odd = here + mirrored, x[r] * (here - mirrored)
+        part[0, r] = even.real
+        part[1, r] = even.imag
+        part[2, r] = odd.real
+        part[3, r] = odd.imag
+    # The equator is its own mirror image: it counts once.
+    if 2 * (first + last) - 1 == total:
+        even = size[count - 1] * north[count - 1]
+        odd = x[count - 1] * even
+        part[0, count - 1] = even.real
+        part[1, count - 1] = even.imag
+        part[2, count - 1] = odd.real
+        part[3, count - 1] = odd.imag
+    part[:, count:] = 0.0
 
 
 @inner
@@ -302,9 +362,14 @@ def _add_orders(
     first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    (recursion, state, powers, inside), (mixers, factors, series), u, g, masked, sums = room
+    (recursion, state, powers, inside), (mixers, factors, series), quartets, flat, blocks, sums = (
+        room
+    )
+    places, rows, work, values = quartets
+    g, masked, x = blocks[0], blocks[1], work[3 * RINGS : 4 * RINGS]
     padded, n_m = rings[0].size, columns.shape[1]
     for m in range(first_m, stop_m):
+        low, high = windows[0, m], windows[1, m]
         is_new = m == first_m or m % M_CHUNK == 0
         count = _prepare_order(
             m,
@@ -321,34 +386,61 @@ def _add_orders(
             state,
             inside,
         )
-        for i in range(flm.shape[0]):
-            for side in range(sides if m > 0 else 1):
-                sums[: 4 * WIDTH * (count + PADDING)] = 0.0
-                column = columns[i, m if side == 0 else n_m - m]
-                low, high = windows[0, m], windows[1, m]
-                for start in range(low, high, RINGS):
-                    x, shift = _arguments(start, rings, recursion)
-                    _copy_state(state, start, u)
-                    _load_block(first_ring, start, padded - RINGS, column, rings[5], rings[6], g)
-                    add_block_to_degrees(
-                        0,
-                        0,
-                        count,
-                        4,
-                        _LOOK,
-                        inside[(start - low) // RINGS],
-                        recursion[0],
-                        shift,
-                        g,
-                        masked,
-                        x,
-                        u[0],
-                        u[1],
-                        u[2],
-                        sums,
-                    )
-                _collect(m, count, sums, mixers, series[0])
-                _add_series(m, side, n, L, factors, series, weights, flm[i])
+        n_sides = sides if m > 0 else 1
+        used = n_sides * flm.shape[0]
+        stop = _end_of_blocks(low, high)
+        for q in range(used):
+            sums[q, : 4 * WIDTH * (count + PADDING)] = 0.0
+            column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
+            if high > low:
+                _load_rows(
+                    first_ring, low, stop, padded - RINGS, column, rings[5], rings[6], rows[q]
+                )
+        used_places = places[:used]
+        for start in range(low, high, RINGS):
+            is_polar = _load_state(state, rings, start, work)
+            shift = recursion[2] if is_polar else recursion[1]
+            reached = inside[(start - low) // RINGS]
+            if used == 1:
+                copy_rows(flat, 4, start, used_places, padded, g)
+                add_block_to_degrees(
+                    0,
+                    0,
+                    count,
+                    4,
+                    _LOOK,
+                    reached,
+                    recursion[0],
+                    shift,
+                    g,
+                    masked,
+                    x,
+                    work[:RINGS],
+                    work[RINGS : 2 * RINGS],
+                    work[2 * RINGS : 3 * RINGS],
+                    sums[0],
+                )
+            else:
+                add_quartets_to_degrees(
+                    0,
+                    0,
+                    count,
+                    _LOOK,
+                    reached,
+                    start,
+                    used_places,
+                    padded,
+                    recursion[0],
+                    shift,
+                    rows,
+                    work,
+                    values,
+                    sums,
+                )
+        for q in range(used):
+            _collect(m, count, sums[q], mixers, series[0])
+            side = q % n_sides
+            _add_series(m, side, n, L, factors, series, weights, flm[q // n_sides])
 
 
 @kernel
@@ -359,13 +451,14 @@ def add_mirrored_to_harmonics(
 
     Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
     """
+    quartets = _quartets(sides * flm.shape[0], rings[0].size)
     room = (
         _workspace(L, n, rings[0].size),
         _series_workspace(L, n),
-        np.empty((3, RINGS)),
-        np.empty(4 * RINGS),
-        np.empty(4 * RINGS),
-        np.empty(4 * WIDTH * (L + abs(n) + PADDING)),
+        quartets,
+        quartets[1].reshape(-1),
+        np.empty((2, 4 * RINGS)),
+        np.empty((sides * flm.shape[0], 4 * WIDTH * (L + abs(n) + PADDING))),
     )
     _add_orders(
         first_m,

@@ -4,11 +4,19 @@ A block passes three stages. While all its rings are out of range, the degree on
 some are, the sums of the others are formed, a few degrees at a time; once none is, one call
 runs to the end. The columns c or g hold two real numbers for each complex series. Each tile is
 called from one place only: every call is another copy of its machine code.
+
+More columns than four share a block by quartets (`products`): the values of up to `CHUNK` degrees
+are made once, and then multiplied with each quartet.
 """
 
 from __future__ import annotations
 
 from spinsdw.compiled.jit import inner
+from spinsdw.compiled.products import (
+    add_products_to_degrees,
+    add_products_to_rings,
+    fill_values,
+)
 from spinsdw.compiled.vectors import (
     RINGS,
     add_to_degrees_2,
@@ -19,7 +27,18 @@ from spinsdw.compiled.vectors import (
 )
 from spinsdw.compiled.wigner_recursion import rescale
 
-__all__ = ["add_block_to_degrees", "sum_block"]
+__all__ = [
+    "CHUNK",
+    "add_block_to_degrees",
+    "add_quartets_to_degrees",
+    "copy_rows",
+    "copy_sums",
+    "sum_block",
+    "sum_quartets",
+]
+
+# Degrees whose values are kept: those of 32 rings take 16 KiB of the first-level cache.
+CHUNK = 64
 
 
 @inner
@@ -100,3 +119,101 @@ def add_block_to_degrees(
             inside = rescale(before, now, scale)
             _mask_outside(scale, columns, g, masked)
         el += 2 * pairs
+
+
+@inner
+def copy_sums(sums, columns, start, places, stride, rows):
+    """Copy what `sum_block` found to its rows, which begin at places[0]; rows has one axis."""
+    for k in range(columns):
+        first = places[0, k // 2] + (k & 1) * stride + start
+        for r in range(RINGS):
+            rows[first + r] = sums[k * RINGS + r]
+
+
+@inner
+def copy_rows(rows, columns, start, places, stride, g):
+    """Copy a block of rows to the columns of `add_block_to_degrees`."""
+    for k in range(columns):
+        first = places[0, k // 2] + (k & 1) * stride + start
+        for r in range(RINGS):
+            g[k * RINGS + r] = rows[first + r]
+
+
+@inner
+def _rescale(work):
+    return rescale(work[:RINGS], work[RINGS : 2 * RINGS], work[2 * RINGS : 3 * RINGS])
+
+
+@inner
+def _pass_silent(first, lowest, L, look, inside, a, b, work, values):
+    """Move the recursion to where a ring is in range and coefficients begin.
+
+    Returns the degree, and how many rings are in range.
+    """
+    el = first
+    x = work[3 * RINGS : 4 * RINGS]
+    while el < L and (inside == 0 or el + look <= lowest):
+        pairs = _next_pairs(el, lowest, L, look, inside == RINGS, True)
+        advance(a, b, x, x, work[:RINGS], work[RINGS : 2 * RINGS], values, el, pairs)
+        if inside < RINGS:
+            inside = _rescale(work)
+        el += 2 * pairs
+    return el, inside
+
+
+@inner
+def _fill_chunk(first, L, look, inside, a, b, work, values):
+    """values[j, r] = u_l(x_r) for l = first + j, zero out of range, of up to `CHUNK` degrees.
+
+    Returns how many degrees, and how many rings are in range after them.
+    """
+    made = 0
+    while made < CHUNK and first + made < L:
+        pairs = look // 2
+        if inside == RINGS:
+            pairs = min(CHUNK - made, L - first - made + 1) // 2
+        for r in range(RINGS):
+            work[4 * RINGS + r] = 1.0 if work[2 * RINGS + r] == 0.0 else 0.0
+        fill_values(a, b, work, values, first, first + made, pairs)
+        if inside < RINGS:
+            inside = _rescale(work)
+        made += 2 * pairs
+    return made, inside
+
+
+@inner
+def sum_quartets(
+    first, lowest, L, look, inside, start, places, stride, a, b, c, work, values, rows
+):
+    """Add sum_{l=first}^{L-1} c[i, l, k] u_l(x_r) to the rows of each quartet, r from ``start`` on.
+
+    places: where the rows of quartet i begin, in pairs; work: rows u_{l0-1}, u_{l0}, exponents, x
+    and room for a mask; the rest as in `sum_block`.
+    """
+    el = first
+    if inside == 0 or first < lowest:
+        el, inside = _pass_silent(first, lowest, L, look, inside, a, b, work, values)
+    while el < L:
+        made, inside = _fill_chunk(el, L, look, inside, a, b, work, values)
+        for i in range(places.shape[0]):
+            one, other = places[i, 0] + start, places[i, 1] + start
+            place = i * c.shape[1]
+            add_products_to_rings(c, values, rows, el, made // 2, place, one, other, stride)
+        el += made
+
+
+@inner
+def add_quartets_to_degrees(
+    first, lowest, L, look, inside, start, places, stride, a, b, rows, work, values, sums
+):
+    """sums[i, l, k, lane] += sum_r rows[i, k, r] u_l(x_r): the adjoint of `sum_quartets`."""
+    el = first
+    if inside == 0 or first < lowest:
+        el, inside = _pass_silent(first, lowest, L, look, inside, a, b, work, values)
+    while el < L:
+        made, inside = _fill_chunk(el, L, look, inside, a, b, work, values)
+        for i in range(places.shape[0]):
+            one, other = places[i, 0] + start, places[i, 1] + start
+            place = i * sums.shape[1]
+            add_products_to_degrees(rows, values, sums, el, made // 2, place, one, other, stride)
+        el += made

@@ -9,7 +9,7 @@ import pytest
 from llvmlite import binding
 from numba import types
 
-from spinsdw.compiled import vectors
+from spinsdw.compiled import products, vectors
 from tests.helpers import needs_compiler
 
 TRIPLE = "aarch64-unknown-linux-gnu"
@@ -17,6 +17,7 @@ TRIPLE = "aarch64-unknown-linux-gnu"
 WIDTH, VECTORS = 2, 2
 ARRAY = types.float64[::1]
 SIGNATURE = types.void(*[ARRAY] * 7, types.int64, types.int64)
+PRODUCTS = types.void(*[ARRAY] * 3, *[types.int64] * 6)
 TILES = {
     "sums of four columns": (vectors._make_ring_tile, 4),
     "sums of two columns": (vectors._make_ring_tile, 2),
@@ -37,7 +38,7 @@ def machine():
     return target.create_target_machine(cpu="neoverse-n1", opt=3)
 
 
-def native_function(tile):
+def native_function(tile, signature):
     """Return the LLVM text of a function that calls a tile, and of what it declares.
 
     Not the wrappers for Python, which hold instructions of the processor at hand.
@@ -47,7 +48,7 @@ def native_function(tile):
     def call(a, b, c, x, before, now, sums, first, pairs):
         tile(a, b, c, x, before, now, sums, first, pairs)
 
-    call.compile(SIGNATURE)
+    call.compile(signature)
     text = call.inspect_llvm(call.signatures[0])
     pattern = r"^define [^\n]*@_ZN(?!7cpython)[^\n]*\{\n.*?^\}$"
     body = re.search(pattern, text, flags=re.MULTILINE | re.DOTALL)[0]
@@ -60,11 +61,11 @@ def native_function(tile):
     return re.sub(r", ![\w.]+ !\d+| #\d+", "", whole)
 
 
-def hottest_block(tile):
+def hottest_block(tile, signature=SIGNATURE):
     """Return the basic block with the most vector multiply-adds: the loop over degrees."""
     compiler = machine()
     head = f'target triple = "{TRIPLE}"\ntarget datalayout = "{compiler.target_data}"\n'
-    module = binding.parse_assembly(head + native_function(tile))
+    module = binding.parse_assembly(head + native_function(tile, signature))
     module.verify()
     blocks = re.split(r"^\.L\w+:.*$", compiler.emit_assembly(module), flags=re.MULTILINE)
     return max(blocks, key=count_multiply_adds)
@@ -79,8 +80,18 @@ def count_multiply_adds(assembly):
 def test_loops_over_degrees_are_vector_multiply_adds_on_arm(make, columns):
     """2 of recursion and one a column for each vector and degree; two degrees a pass."""
     shape = (VECTORS, columns, WIDTH)
-    block = hottest_block(make(*shape))
-    expected = 2 * VECTORS * (2 + columns)
+    check_loop(hottest_block(make(*shape)), 2 * VECTORS * (2 + columns))
+
+
+@needs_compiler
+@pytest.mark.parametrize("make", [products._make_ring_products, products._make_degree_products])
+def test_products_are_vector_multiply_adds_on_arm(make):
+    """One a column for each vector and degree."""
+    block = hottest_block(make(VECTORS, WIDTH), PRODUCTS)
+    check_loop(block, 2 * VECTORS * products.QUARTET)
+
+
+def check_loop(block, expected):
     found = count_multiply_adds(block)
     # LLVM may unroll the loop further.
     assert found >= expected
