@@ -107,13 +107,18 @@ class MirrorEngine:
     def _belt_geometry(self) -> tuple[Any, ...]:
         return self._rings, self._belt.windows(0), self._tables
 
+    def _in_cap(self, call: OrderCall) -> OrderCall:
+        """Leave out the orders that no ring next to the pole has."""
+        count = int(self.limits[: self._first_ring].max())
+        return lambda first, stop: call(first, min(stop, count))
+
     def _filling(self, flm: Array, sums: OrderSums, out: Array) -> Iterator[OrderCall]:
         from spinsdw.compiled.legendre_sums import fill_mirrored_columns
 
         one = np.ones((1, 1), dtype=np.complex128)
         if self._first_ring > 0:
             for i in range(len(flm)):
-                yield self._cap.filling(flm[i : i + 1], sums, one, out[i : i + 1])
+                yield self._in_cap(self._cap.filling(flm[i : i + 1], sums, one, out[i : i + 1]))
         if self._first_ring < self.colatitudes.size:
             what = (self.bandlimit, sums.sides, self.order, self._first_ring, flm, sums.weights[0])
             where = (*self._belt_geometry(), out)
@@ -124,7 +129,7 @@ class MirrorEngine:
 
         if self._first_ring > 0:
             for i in range(len(out)):
-                yield self._cap.adding(columns[i : i + 1], sums, out[i : i + 1])
+                yield self._in_cap(self._cap.adding(columns[i : i + 1], sums, out[i : i + 1]))
         if self._first_ring < self.colatitudes.size:
             what = (self.bandlimit, sums.sides, self.order, self._first_ring, columns)
             where = (sums.weights[0], *self._belt_geometry(), out)

@@ -34,7 +34,7 @@ from spinsdw.compiled.ring_sums import (
     sum_quartets,
 )
 from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
-from spinsdw.compiled.wigner_recursion import PADDING, fill_start, prepare_powers, signed_norm
+from spinsdw.compiled.wigner_recursion import PADDING, load_start, prepare_start
 
 __all__ = ["add_mirrored_to_harmonics", "fill_mirrored_columns"]
 
@@ -44,9 +44,9 @@ _LOOK = PADDING // 2
 
 @inner
 def _prepare_order(
-    m, n, L, tables, rings, powers, is_new, window, recursion, mixers, factors, state, inside
+    m, n, L, tables, rings, is_new, window, recursion, mixers, factors, powers, start
 ):
-    """Fill the recursion of m, and u_0 and the exponents of all rings in the window."""
+    """Fill the recursion of m, and what the start of all rings in the window has of m."""
     a, b, shifted, scale, ratios = recursion
     size = abs(n)
     count = (L + size - m + 1) // 2
@@ -63,21 +63,10 @@ def _prepare_order(
         a[k] = 0.0
         b[k] = 0.0
         shifted[k] = 0.0
-    prepare_powers(m, 0, is_new, rings, powers)
-    norm, norm_power = signed_norm(m, 0, tables[1])
-    norm *= math.sqrt((2.0 * m + 1.0) * (2.0 * m + 3.0))
-    low = window[0]
-    blocks = (window[1] - low + RINGS - 1) // RINGS
-    if blocks > 0:
-        part = state[:, low : low + blocks * RINGS]
-        total = fill_start(norm, norm_power, powers, low, part[0], part[1], part[2], part[3])
-        for block in range(blocks):
-            found = RINGS
-            if total < part.shape[1]:
-                found = 0
-                for r in range(block * RINGS, (block + 1) * RINGS):
-                    found += int(part[2, r] == 0.0)
-            inside[block] = found
+    if window[1] > window[0]:
+        # The last block of any later m, too, ends there.
+        stop = window[1] + RINGS
+        prepare_start(m, 0, is_new, tables[1], rings, window[0], stop, powers, start)
     return count
 
 
@@ -133,15 +122,23 @@ def _store_rows(first, low, stop, rows, cosine, factor, column):
 
 
 @inner
-def _load_state(state, rings, start, work):
-    """Bring a block's start and argument to ``work``; return whether the argument is -sin^2."""
+def _rows_of(work):
+    """Return the parts of a block's workspace: u_{k-1}, u_k, the exponents and the argument."""
+    return (
+        work[:RINGS],
+        work[RINGS : 2 * RINGS],
+        work[2 * RINGS : 3 * RINGS],
+        work[3 * RINGS : 4 * RINGS],
+    )
+
+
+@inner
+def _load_argument(rings, start, x):
+    """Copy the argument that is exact on a block; return whether it is -sin^2."""
     is_polar = rings[0][start] < 0.7
-    x = rings[4] if is_polar else rings[3]
+    values = (rings[4] if is_polar else rings[3])[start:]
     for r in range(RINGS):
-        work[r] = state[0, start + r]
-        work[RINGS + r] = state[1, start + r]
-        work[2 * RINGS + r] = state[2, start + r]
-        work[3 * RINGS + r] = x[start + r]
+        x[r] = values[r]
     return is_polar
 
 
@@ -149,10 +146,7 @@ def _load_state(state, rings, start, work):
 def _workspace(L, n, padded):
     size = L + abs(n) + PADDING
     recursion = (np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size))
-    state, powers = np.empty((4, padded)), np.empty((4, padded))
-    powers[2] = 1.0
-    powers[3] = 0.0
-    return recursion, state, powers, np.empty(padded // RINGS + 1, dtype=np.int64)
+    return recursion, np.empty((6, padded)), np.empty((2, padded))
 
 
 @kernel
@@ -185,9 +179,9 @@ def _fill_orders(
     first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, room, columns
 ):
     """Fill the columns of some orders; ``room`` is what `fill_mirrored_columns` allocates."""
-    (recursion, state, powers, inside), (mixers, factors, series), quartets, flat, sums, c = room
+    (recursion, powers, starts), (mixers, factors, series), quartets, flat, sums, c = room
     places, rows, work, values = quartets
-    x = work[3 * RINGS : 4 * RINGS]
+    before, now, scale, x = _rows_of(work)
     padded, n_m = rings[0].size, columns.shape[1]
     n_rings = padded - RINGS
     for m in range(first_m, stop_m):
@@ -199,15 +193,16 @@ def _fill_orders(
             L,
             tables,
             rings,
-            powers,
             is_new,
             windows[:, m],
             recursion,
             mixers,
             factors,
-            state,
-            inside,
+            powers,
+            starts,
         )
+        # Of r_0 = p_{m+1} / x, where the start has d^m_m0.
+        norm = math.sqrt((2.0 * m + 1.0) * (2.0 * m + 3.0))
         n_sides = sides if m > 0 else 1
         used = n_sides * flm.shape[0]
         for q in range(used):
@@ -216,9 +211,9 @@ def _fill_orders(
         used_places = places[:used]
         rows[:used] = 0.0
         for start in range(low, high, RINGS):
-            is_polar = _load_state(state, rings, start, work)
+            is_polar = _load_argument(rings, start, x)
             shift = recursion[2] if is_polar else recursion[1]
-            reached = inside[(start - low) // RINGS]
+            reached = load_start(starts, start, norm, before, now, scale)
             if used == 1:
                 sum_block(
                     0,
@@ -231,9 +226,9 @@ def _fill_orders(
                     shift,
                     c[0],
                     x,
-                    work[:RINGS],
-                    work[RINGS : 2 * RINGS],
-                    work[2 * RINGS : 3 * RINGS],
+                    before,
+                    now,
+                    scale,
                     sums,
                 )
                 copy_sums(sums, 4, start, used_places, padded, flat)
@@ -362,11 +357,10 @@ def _add_orders(
     first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    (recursion, state, powers, inside), (mixers, factors, series), quartets, flat, blocks, sums = (
-        room
-    )
+    (recursion, powers, starts), (mixers, factors, series), quartets, flat, blocks, sums = room
     places, rows, work, values = quartets
-    g, masked, x = blocks[0], blocks[1], work[3 * RINGS : 4 * RINGS]
+    g, masked = blocks[0], blocks[1]
+    before, now, scale, x = _rows_of(work)
     padded, n_m = rings[0].size, columns.shape[1]
     for m in range(first_m, stop_m):
         low, high = windows[0, m], windows[1, m]
@@ -377,15 +371,16 @@ def _add_orders(
             L,
             tables,
             rings,
-            powers,
             is_new,
             windows[:, m],
             recursion,
             mixers,
             factors,
-            state,
-            inside,
+            powers,
+            starts,
         )
+        # Of r_0 = p_{m+1} / x, where the start has d^m_m0.
+        norm = math.sqrt((2.0 * m + 1.0) * (2.0 * m + 3.0))
         n_sides = sides if m > 0 else 1
         used = n_sides * flm.shape[0]
         stop = _end_of_blocks(low, high)
@@ -398,9 +393,9 @@ def _add_orders(
                 )
         used_places = places[:used]
         for start in range(low, high, RINGS):
-            is_polar = _load_state(state, rings, start, work)
+            is_polar = _load_argument(rings, start, x)
             shift = recursion[2] if is_polar else recursion[1]
-            reached = inside[(start - low) // RINGS]
+            reached = load_start(starts, start, norm, before, now, scale)
             if used == 1:
                 copy_rows(flat, 4, start, used_places, padded, g)
                 add_block_to_degrees(
@@ -415,9 +410,9 @@ def _add_orders(
                     g,
                     masked,
                     x,
-                    work[:RINGS],
-                    work[RINGS : 2 * RINGS],
-                    work[2 * RINGS : 3 * RINGS],
+                    before,
+                    now,
+                    scale,
                     sums[0],
                 )
             else:

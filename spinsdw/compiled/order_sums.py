@@ -23,14 +23,13 @@ from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
 from spinsdw.compiled.wigner_recursion import (
     PADDING,
     fill_recursion,
-    fill_start,
-    prepare_powers,
-    signed_norm,
+    load_start,
+    prepare_start,
 )
 
 __all__ = ["M_CHUNK", "add_columns_to_harmonics", "fill_columns"]
 
-# Powers of sin(theta) are carried from m to m + 1 and computed anew at every multiple of M_CHUNK,
+# Starts of the recursion go from m to m + 1 and are made anew at every multiple of M_CHUNK,
 # so that results do not depend on how a caller splits the range of m (at multiples of it).
 M_CHUNK = 16
 
@@ -88,13 +87,13 @@ def _shift_argument(first, L, a, b, north, south):
     Near a pole cos(theta) is 1 minus something small, and its rounding error would be a wrong
     theta, the same at every degree: a phase error growing with l. The shifted argument is exact.
     """
-    for el in range(first, L):
-        north[el] = b[el] + a[el]
-        south[el] = b[el] - a[el]
-    for el in range(L, L + PADDING):
-        a[el] = 0.0
-        north[el] = 0.0
-        south[el] = 0.0
+    plus, minus, slope, offset = north[first:L], south[first:L], a[first:L], b[first:L]
+    for i in range(plus.size):
+        plus[i] = offset[i] + slope[i]
+        minus[i] = offset[i] - slope[i]
+    a[L : L + PADDING] = 0.0
+    north[L : L + PADDING] = 0.0
+    south[L : L + PADDING] = 0.0
 
 
 @inner
@@ -181,10 +180,11 @@ def _fill_orders(
     columns,
 ):
     """Fill the columns of some orders; ``room`` is what `fill_columns` allocates."""
-    recursion, c, sums, state, powers, gathered, series, mixed = room
+    recursion, c, sums, state, powers, starts, gathered, series, mixed = room
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
         _gather(m, L, flm, gathered)
+        is_new = m == first_m or m % M_CHUNK == 0
         low, high = windows[0, m], windows[1, m]
         covered = low + (high - low + RINGS - 1) // RINGS * RINGS if high > low else low
         filled = 2 * L
@@ -192,8 +192,11 @@ def _fill_orders(
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
-            prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
             is_empty = first >= L or high <= low
+            if not is_empty:
+                # The last block of any later m, too, ends there.
+                stop = high + RINGS
+                prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
             columns_used = 0
             for slot in range(2):
                 if _is_active(run, slot, m, sides):
@@ -210,11 +213,8 @@ def _fill_orders(
                     _fill_coefficients(
                         run, slot, k, columns_used, m, L, lowest, gathered, weights, scale, c
                     )
-            norm, norm_power = signed_norm(m, n, tables[1])
             for start in range(low, high, RINGS):
-                inside = fill_start(
-                    norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
-                )
+                inside = load_start(starts[j], start, 1.0, state[0], state[1], state[2])
                 is_north = rings[2][start] < 1.0
                 x = (rings[3] if is_north else rings[1])[start : start + RINGS]
                 shift = recursion[3] if is_north else recursion[4]
@@ -259,8 +259,9 @@ def fill_columns(
         _recursion_room(L),
         np.empty(4 * (L + PADDING)),
         np.empty(4 * RINGS),
-        np.empty((4, RINGS)),
-        np.empty((n_runs, 4, padded)),
+        np.empty((3, RINGS)),
+        np.empty((6, padded)),
+        np.empty((n_runs, 2, padded)),
         np.empty((flm.shape[0], sides, L), dtype=np.complex128),
         np.zeros((n_orders, sides, mirrored + 1, 2, padded)),
         np.empty((2, padded)),
@@ -319,29 +320,32 @@ def _add_orders(
     first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    recursion, sums, g, masked, state, powers = room
+    recursion, sums, g, masked, state, powers, starts = room
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
+        is_new = m == first_m or m % M_CHUNK == 0
+        low, high = windows[0, m], windows[1, m]
         filled = 2 * L
         for j in range(n_runs):
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
-            prepare_powers(m, n, m == first_m or m % M_CHUNK == 0, rings, powers[j])
+            is_empty = first >= L or high <= low
+            if not is_empty:
+                # The last block of any later m, too, ends there.
+                stop = high + RINGS
+                prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
             columns_used = 0
             for slot in range(2):
                 columns_used += 2 if _is_active(run, slot, m, sides) else 0
-            if columns_used == 0 or first >= L or windows[1, m] <= windows[0, m]:
+            if columns_used == 0 or is_empty:
                 continue
             _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
             filled = n
             a, scale = recursion[0], recursion[2]
             sums[first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
-            norm, norm_power = signed_norm(m, n, tables[1])
-            for start in range(windows[0, m], windows[1, m], RINGS):
-                inside = fill_start(
-                    norm, norm_power, powers[j], start, state[0], state[1], state[2], state[3]
-                )
+            for start in range(low, high, RINGS):
+                inside = load_start(starts[j], start, 1.0, state[0], state[1], state[2])
                 for slot in range(2):
                     if _is_active(run, slot, m, sides):
                         k = columns_used - 2 if slot == 1 else 0
@@ -386,8 +390,9 @@ def add_columns_to_harmonics(
         np.empty(4 * WIDTH * (L + PADDING)),
         np.empty(4 * RINGS),
         np.empty(4 * RINGS),
-        np.empty((4, RINGS)),
-        np.empty((runs.shape[0], 4, rings[0].size)),
+        np.empty((3, RINGS)),
+        np.empty((6, rings[0].size)),
+        np.empty((runs.shape[0], 2, rings[0].size)),
     )
     _add_orders(
         first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm

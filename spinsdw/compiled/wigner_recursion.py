@@ -26,11 +26,12 @@ from spinsdw.compiled.jit import inner
 
 __all__ = [
     "PADDING",
+    "advance_start",
     "fill_powers",
     "fill_recursion",
     "fill_start",
-    "multiply_powers",
-    "prepare_powers",
+    "load_start",
+    "prepare_start",
     "rescale",
     "signed_norm",
     "start_norm",
@@ -44,6 +45,7 @@ PADDING = 16
 _STEP = 800
 _FLOOR = -160
 _SHRINK = 2.0**-_STEP
+_GROW = 2.0**_STEP
 _SMALLEST = 2.0**_FLOOR
 _POWERS_OF_TWO = 2.0 ** np.arange(_FLOOR, _STEP + _FLOOR + 1)
 _LIMIT = 2.0 ** (_STEP + _FLOOR)
@@ -56,25 +58,30 @@ def fill_recursion(m, n, L, root, inverse, a, b, scale):
     """Fill a_l, b_l, scale_l, max(m, |n|) <= l < L, from root[k] = sqrt(k), inverse[k] = 1 / k."""
     n_abs = abs(n)
     first = max(m, n_abs)
-    mn = float(m) * float(n)
-    # Three loops that vectorise around the one that cannot; b holds w_{l+1} until the last.
-    for el in range(first, L):
-        b[el] = (
-            (root[el + 1 - m] * root[el + 1 + m])
-            * (root[el + 1 - n_abs] * root[el + 1 + n_abs])
-            * inverse[el + 1]
-        )
-    for el in range(first + 1, L):
-        a[el] = b[el - 1] / b[el]
-    scale[first] = 1.0
-    scale[first + 1] = 1.0
-    for el in range(first + 1, L):
-        scale[el + 1] = scale[el - 1] * a[el]
-    for el in range(first, L):
+    mn, count = float(m) * float(n), L - first
+    # Loops count from 0 on slices, for then the compiler sees that no index is negative, and takes
+    # vectors. All do but the one that cannot; b holds w_{l+1} until the last.
+    a, b, scale = a[first:], b[first:], scale[first:]
+    below, above, here = root[first + 1 - m :], root[first + 1 + m :], inverse[first:]
+    left, right, after = root[first + 1 - n_abs :], root[first + 1 + n_abs :], inverse[first + 1 :]
+    for i in range(count):
+        b[i] = (below[i] * above[i]) * (left[i] * right[i]) * after[i]
+    upper, ratios = b[1:], a[1:]
+    for i in range(count - 1):
+        ratios[i] = b[i] / upper[i]
+    before, now = 1.0, 1.0
+    scale[0] = before
+    scale[1] = now
+    later = scale[2:]
+    for i in range(count - 1):
+        before, now = now, before * ratios[i]
+        later[i] = now
+    later = scale[1:]
+    for i in range(count):
         # From the scales as they were rounded: so their errors are no errors of the recursion.
-        value = (2 * el + 1) * scale[el] / (b[el] * scale[el + 1])
-        a[el] = value
-        b[el] = -value * mn * inverse[el] * inverse[el + 1]
+        value = (2.0 * (first + i) + 1.0) * scale[i] / (b[i] * later[i])
+        a[i] = value
+        b[i] = -value * mn * here[i] * after[i]
 
 
 @inner
@@ -107,16 +114,6 @@ def fill_powers(base, exponent, mantissa, power):
 
 
 @inner
-def multiply_powers(base, mantissa, power):
-    """Raise the exponent of `fill_powers` by one, for a base in [0, 1]."""
-    for r in range(base.size):
-        value = mantissa[r] * base[r]
-        small = value < _UNRENORM
-        mantissa[r] = value * (_RENORM if small else 1.0)
-        power[r] -= 256.0 if small else 0.0
-
-
-@inner
 def start_norm(M, K, central):
     """Return (v, e): v 2**e = sqrt(binom(2M, M + K) / 4**M), central[M] = binom(2M, M) / 4**M."""
     value, power = central[M], 0.0
@@ -126,24 +123,6 @@ def start_norm(M, K, central):
             value *= 2.0**512
             power -= 256.0
     return math.sqrt(value), power
-
-
-@inner
-def _fill_order_powers(m, n, rings, powers):
-    """Fill sin(theta)^(M - |K|) and (1 +- cos(theta))^|K|: all of d^M_mn that depends on theta."""
-    sine, plus, minus = rings[0], rings[1], rings[2]
-    n_abs = abs(n)
-    fill_powers(sine, abs(m - n_abs), powers[0], powers[1])
-    fill_powers(plus if n >= 0 else minus, min(m, n_abs), powers[2], powers[3])
-
-
-@inner
-def prepare_powers(m, n, is_new, rings, powers):
-    """Bring the powers to m, from m - 1 unless ``is_new``."""
-    if is_new or m <= abs(n):
-        _fill_order_powers(m, n, rings, powers)
-    else:
-        multiply_powers(rings[0], powers[0], powers[1])
 
 
 @inner
@@ -202,6 +181,52 @@ def fill_start(norm, norm_power, powers, first, before, now, scale, power):
     for r in range(now.size):
         small += int(abs(now[r]) < _SMALLEST) + int(power[r] != 0.0)
     return _fill_small_start(power, now, scale) if small > 0 else now.size
+
+
+@inner
+def advance_start(factor, base, now, scale):
+    """Multiply now 2**(800 scale) by factor * base, and bring it back into range."""
+    for r in range(now.size):
+        value = now[r] * (factor * base[r])
+        size = abs(value)
+        # The zeros of a pole stay in range.
+        is_small = 0.0 < size < _SMALLEST
+        is_large = scale[r] < 0.0 and size > _LIMIT
+        now[r] = value * (_GROW if is_small else (_SHRINK if is_large else 1.0))
+        scale[r] += (1.0 if is_large else 0.0) - (1.0 if is_small else 0.0)
+
+
+@inner
+def prepare_start(m, n, is_new, central, rings, first, stop, powers, start):
+    """Bring u_M and the exponents, start[0] and start[1], of some rings to m.
+
+    From m - 1, where they must be those of at least these rings, unless ``is_new``; ``powers`` is
+    room for 6 numbers a ring.
+    """
+    sine, plus, minus = rings[0][first:stop], rings[1][first:stop], rings[2][first:stop]
+    now, scale, part = start[0, first:stop], start[1, first:stop], powers[:, first:stop]
+    if is_new or m <= abs(n):
+        n_abs = abs(n)
+        fill_powers(sine, abs(m - n_abs), part[0], part[1])
+        fill_powers(plus if n >= 0 else minus, min(m, n_abs), part[2], part[3])
+        norm, norm_power = signed_norm(m, n, central)
+        fill_start(norm, norm_power, part, 0, part[4], now, scale, part[5])
+    else:
+        ratio = 0.5 * math.sqrt(2.0 * m / (m + n) * ((2.0 * m - 1.0) / (m - n)))
+        advance_start(-ratio, sine, now, scale)
+
+
+@inner
+def load_start(start, first, factor, before, now, scale):
+    """Copy the start of a block of rings, times a factor; return how many rings are in range."""
+    values, exponents = start[0, first:], start[1, first:]
+    inside = 0
+    for r in range(now.size):
+        now[r] = factor * values[r]
+        before[r] = 0.0
+        scale[r] = exponents[r]
+        inside += 1 if exponents[r] == 0.0 else 0
+    return inside
 
 
 @inner

@@ -13,7 +13,7 @@ from spinsdw.compiled.wigner_recursion import (
     fill_powers,
     fill_recursion,
     fill_start,
-    multiply_powers,
+    prepare_start,
     rescale,
     start_norm,
 )
@@ -146,17 +146,30 @@ def test_powers_of_zero_are_zero_but_for_the_first():
         assert mantissa[0] == desired
 
 
-@pytest.mark.parametrize("base", [0.0, 1e-3, 0.7, 1.0])
-def test_multiplying_raises_the_exponent_by_one(base):
-    """base^0 multiplied 3000 times is base^3000."""
-    values, mantissa, power = np.array([base]), np.empty(1), np.empty(1)
-    fill_powers(values, 0, mantissa, power)
-    for _ in range(3000):
-        multiply_powers(values, mantissa, power)
-    desired, desired_power = np.empty(1), np.empty(1)
-    fill_powers(values, 3000, desired, desired_power)
-    ratio = Fraction(desired[0]) * Fraction(2) ** int(desired_power[0] - power[0]) if base else 0
-    assert abs(float(ratio - Fraction(mantissa[0]))) <= 6000 * EPS * mantissa[0]
+@pytest.mark.parametrize("n", [0, 2, -3, 40])
+@pytest.mark.parametrize("theta", [1e-3, 0.1, 0.7, 1.5, 3.1])
+def test_start_is_carried_from_order_to_order(n, theta):
+    """d^m_mn carried over 300 orders m is d^m_mn made anew, exponents included."""
+    rings = tuple(np.array([f]) for f in (np.sin(theta), 1 + np.cos(theta), 1 - np.cos(theta)))
+    central = central_binomials(400)
+    powers, carried, anew = np.empty((6, 1)), np.empty((2, 1)), np.empty((2, 1))
+    first = abs(n) + 1
+    for m in range(first, first + 300):
+        prepare_start(m, n, m == first, central, rings, 0, 1, powers, carried)
+        prepare_start(m, n, True, central, rings, 0, 1, powers, anew)
+        shift = 800 * (carried[1, 0] - anew[1, 0])
+        assert abs(carried[0, 0] * 2.0**shift / anew[0, 0] - 1) <= 4 * m * EPS
+        # Whoever is out of range is too small to count, and has room to grow.
+        size = abs(carried[0, 0])
+        assert size < 2.0**640 if carried[1, 0] < 0 else size >= 2.0**-160
+
+
+def test_start_at_a_pole_is_zero_and_in_range():
+    rings = tuple(np.array([f]) for f in (0.0, 2.0, 0.0))
+    powers, start = np.empty((6, 1)), np.empty((2, 1))
+    for m in range(5):
+        prepare_start(m, 0, m == 0, central_binomials(5), rings, 0, 1, powers, start)
+        assert start[:, 0].tolist() == [1.0 if m == 0 else 0.0, 0.0]
 
 
 @pytest.mark.parametrize(("M", "K"), [(0, 0), (1, 1), (5, -3), (60, 0), (60, 60), (2000, -1990)])
