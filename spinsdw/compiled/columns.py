@@ -80,14 +80,19 @@ def fill_circles(columns, mixing, even, odd, parities, offset, circles):
 
 
 @kernel
-def fold_circles(circles, even, odd, parities, offset, columns):
-    """Transpose of `fill_circles` without mixing: circles[i] goes to row i of the columns."""
+def fold_circles(circles, weights, shifted, even, odd, parities, offset, columns):
+    """Transpose of `fill_circles` without mixing, of weights * circles + shifted.
+
+    Circles of index i go to row i of the columns; what is left in ``circles`` is of no use.
+    """
     size, n_rings = circles.shape[2], columns.shape[2]
     spare = np.empty(n_rings, dtype=columns.dtype)
     for i in range(circles.shape[0]):
         parity = parities[i]
         for j in range(circles.shape[1]):
-            values = circles[i, j]
+            values, more = circles[i, j], shifted[i, j]
+            for t in range(size):
+                values[t] = weights[t] * values[t] + more[t]
             first = columns[i, even[j]] if even[j] >= 0 else spare
             for t in range(1 - offset, n_rings - 1):
                 first[t] = values[t] + parity * values[size - offset - t]

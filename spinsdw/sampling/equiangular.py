@@ -85,14 +85,6 @@ class _Equiangular(Sampling):
     def _half_step(self) -> HalfStep:
         return HalfStep(self.n_phi)
 
-    def _project(self, circles: Array) -> None:
-        """Replace circles by (w_A + S^T w_B S) circles, times the constants."""
-        here, between = self._circle_weights
-        shifted = self._half_step.shift(circles)
-        shifted *= between
-        circles *= here
-        circles += self._half_step.shift_back(shifted)
-
     def _weigh_batch(
         self, columns: Array, mixing: Array, parities: Array, pairs: tuple[Array, Array]
     ) -> None:
@@ -102,8 +94,12 @@ class _Equiangular(Sampling):
         shape = (parities.size, even.size, self.n_phi)
         circles = np.empty(shape, dtype=np.complex128)
         fill_circles(columns, mixing, even, odd, parities, self._offset, circles)
-        self._project(circles)
-        fold_circles(circles, even, odd, parities, self._offset, columns)
+        # (w_A + S^T w_B S) circles, times the constants; the sum is left to the folding.
+        here, between = self._circle_weights
+        shifted = self._half_step.shift(circles)
+        shifted *= between
+        shifted = self._half_step.shift_back(shifted)
+        fold_circles(circles, here, shifted, even, odd, parities, self._offset, columns)
 
     def weigh_columns(
         self, columns: Array, orders: tuple[int, ...], *, mixing: Array, threads: int
