@@ -117,8 +117,7 @@ class MirrorEngine:
 
         one = np.ones((1, 1), dtype=np.complex128)
         if self._first_ring > 0:
-            for i in range(len(flm)):
-                yield self._in_cap(self._cap.filling(flm[i : i + 1], sums, one, out[i : i + 1]))
+            yield self._in_cap(self._cap.filling(flm[:, None], sums, one, out[:, None]))
         if self._first_ring < self.colatitudes.size:
             what = (self.bandlimit, sums.sides, self.order, self._first_ring, flm, sums.weights[0])
             where = (*self._belt_geometry(), out)
@@ -128,8 +127,7 @@ class MirrorEngine:
         from spinsdw.compiled.legendre_sums import add_mirrored_to_harmonics
 
         if self._first_ring > 0:
-            for i in range(len(out)):
-                yield self._in_cap(self._cap.adding(columns[i : i + 1], sums, out[i : i + 1]))
+            yield self._in_cap(self._cap.adding(columns[:, None], sums, out[:, None]))
         if self._first_ring < self.colatitudes.size:
             what = (self.bandlimit, sums.sides, self.order, self._first_ring, columns)
             where = (sums.weights[0], *self._belt_geometry(), out)

@@ -23,6 +23,8 @@ OrderCall = Callable[[int, int], None]
 
 # exp(-45) = 2**-65: d^l_mn below it adds nothing to a sum in double precision.
 _NEGLIGIBLE = 45.0
+# Axes of the coefficients of one signal: sources, (l, m).
+_SINGLE = 2
 
 
 def share_orders(call: OrderCall, bandlimit: int, threads: int) -> None:
@@ -174,12 +176,14 @@ class RingEngine:
         return runs, windows
 
     def filling(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> OrderCall:
-        """Return what fills the orders first <= m < stop of ``out[k, m, ring]``.
+        """Return what fills the orders first <= m < stop of ``out[..., k, m, ring]``.
 
-        Shapes as in `compiled.order_sums.fill_columns`.
+        Shapes as in `compiled.order_sums.fill_columns`; both arrays may be without a batch.
         """
         from spinsdw.compiled.order_sums import fill_columns
 
+        if flm.ndim == _SINGLE:
+            flm, out = flm[None], out[None]
         runs, windows = self._geometry(sums)
         inputs = (self.bandlimit, sums.lowest, sums.sides, flm, sums.weights, runs, mixing)
         geometry = (self.rings, windows, self.tables)
@@ -188,10 +192,12 @@ class RingEngine:
     def adding(self, columns: Array, sums: OrderSums, out: Array) -> OrderCall:
         """Return what adds to the coefficients ``out`` of the orders first <= m < stop.
 
-        Shapes as in `compiled.order_sums.add_columns_to_harmonics`.
+        Shapes as in `compiled.order_sums.add_columns_to_harmonics`, or without a batch.
         """
         from spinsdw.compiled.order_sums import add_columns_to_harmonics
 
+        if out.ndim == _SINGLE:
+            columns, out = columns[None], out[None]
         runs, windows = self._geometry(sums)
         inputs = (self.bandlimit, sums.lowest, sums.sides, columns, sums.weights, runs)
         geometry = (self.rings, windows, self.tables)

@@ -10,7 +10,11 @@ complex series F_i(sigma m), sigma = +-1, of orders n_i at theta or at the mirro
     -      mirrored  n_i =  n  (-1)^(l + n) d^l_mn
 
 ``runs`` has one row a run: n, then (i, sigma, mirrored) twice, i = -1 for "no series". Columns are
-complex arrays [k, m, ring], -m at place n_m - m.
+complex arrays [map, k, m, ring], -m at place n_m - m.
+
+The series of a run, of all maps, are taken in pairs: one pair goes through the tiles of four real
+columns, and more of them share values as quartets (`ring_sums`). The real and the imaginary part of
+a series are neighbouring rows of all rings.
 """
 
 from __future__ import annotations
@@ -18,7 +22,15 @@ from __future__ import annotations
 import numpy as np
 
 from spinsdw.compiled.jit import inner, kernel
-from spinsdw.compiled.ring_sums import add_block_to_degrees, sum_block
+from spinsdw.compiled.ring_sums import (
+    CHUNK,
+    add_block_to_degrees,
+    add_quartets_to_degrees,
+    copy_rows,
+    copy_sums,
+    sum_block,
+    sum_quartets,
+)
 from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
 from spinsdw.compiled.wigner_recursion import (
     PADDING,
@@ -51,12 +63,13 @@ def _is_active(run, slot, m, sides):
 
 @inner
 def _gather(m, L, flm, gathered):
-    """gathered[source, side, l] = f_{l, +-m}, next to each other for neighbouring degrees."""
-    for source in range(flm.shape[0]):
-        for side in range(gathered.shape[1]):
-            signed_m = m if side == 0 else -m
-            for el in range(m, L):
-                gathered[source, side, el] = flm[source, el * el + el + signed_m]
+    """gathered[map, source, side, l] = f_{l, +-m}, neighbouring degrees next to each other."""
+    for i in range(flm.shape[0]):
+        for source in range(flm.shape[1]):
+            for side in range(gathered.shape[2]):
+                signed_m = m if side == 0 else -m
+                for el in range(m, L):
+                    gathered[i, source, side, el] = flm[i, source, el * el + el + signed_m]
 
 
 @inner
@@ -97,20 +110,55 @@ def _shift_argument(first, L, a, b, north, south):
 
 
 @inner
-def _store_block(run, slot, k, start, sums, series):
-    target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
-    for r in range(RINGS):
-        target[0, start + r] = sums[k * RINGS + r]
-        target[1, start + r] = sums[(k + 1) * RINGS + r]
+def _count_active(run, m, sides):
+    count = 0
+    for slot in range(2):
+        count += 1 if _is_active(run, slot, m, sides) else 0
+    return count
 
 
 @inner
-def _clear(run, slot, low, high, series):
-    """Set to zero what a run does not compute: rings before ``low`` and from ``high`` on."""
-    target = series[run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1, run[3 + 3 * slot]]
-    for part in range(2):
-        target[part, :low] = 0.0
-        target[part, high:] = 0.0
+def _slot_of(run, m, sides, t):
+    """Return the slot of the t-th series of a run at m."""
+    return t if _is_active(run, 0, m, sides) else 1
+
+
+@inner
+def _place_series(run, m, sides, shape, stride, places, rows):
+    """Fill where the rows of all series of a run begin, and clear them; return their number.
+
+    shape: maps, orders, sides and halves of the series.
+    """
+    active = _count_active(run, m, sides)
+    total = shape[0] * active
+    for t in range(total):
+        slot = _slot_of(run, m, sides, t % active)
+        i, side = run[1 + 3 * slot], 0 if run[2 + 3 * slot] > 0 else 1
+        place = (t // active * shape[1] + i) * shape[2] + side
+        place = (place * shape[3] + run[3 + 3 * slot]) * 2 * stride
+        places[t // 2, t % 2] = place
+        rows[place : place + 2 * stride] = 0.0
+    # The partner of an odd one out: rows that nobody reads.
+    if total & 1:
+        places[total // 2, 1] = shape[0] * shape[1] * shape[2] * shape[3] * 2 * stride
+    return total
+
+
+@inner
+def _clear_partner(first, L, c):
+    for el in range(first, L + PADDING):
+        c[4 * el + 2] = 0.0
+        c[4 * el + 3] = 0.0
+
+
+@inner
+def _load_argument(rings, start, work):
+    """Bring a block's argument to ``work``; return whether it is cos - 1."""
+    is_north = rings[2][start] < 1.0
+    x = rings[3] if is_north else rings[1]
+    for r in range(RINGS):
+        work[3 * RINGS + r] = x[start + r]
+    return is_north
 
 
 @inner
@@ -180,13 +228,13 @@ def _fill_orders(
     columns,
 ):
     """Fill the columns of some orders; ``room`` is what `fill_columns` allocates."""
-    recursion, c, sums, state, powers, starts, gathered, series, mixed = room
+    recursion, blocks, (powers, starts), gathered, series, mixed, c = room
+    (before, now, scale, sums, _), work, values, places, rows = blocks
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
         _gather(m, L, flm, gathered)
         is_new = m == first_m or m % M_CHUNK == 0
         low, high = windows[0, m], windows[1, m]
-        covered = low + (high - low + RINGS - 1) // RINGS * RINGS if high > low else low
         filled = 2 * L
         for j in range(n_runs):
             run = runs[j]
@@ -197,74 +245,98 @@ def _fill_orders(
                 # The last block of any later m, too, ends there.
                 stop = high + RINGS
                 prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
-            columns_used = 0
-            for slot in range(2):
-                if _is_active(run, slot, m, sides):
-                    columns_used += 2
-                    _clear(run, slot, padded if is_empty else low, covered, series)
-            if columns_used == 0 or is_empty:
+            total = _place_series(run, m, sides, series.shape, padded, places, rows)
+            if total == 0 or is_empty:
                 continue
             _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
             filled = n
-            a, scale = recursion[0], recursion[2]
-            for slot in range(2):
-                if _is_active(run, slot, m, sides):
-                    k = columns_used - 2 if slot == 1 else 0
-                    _fill_coefficients(
-                        run, slot, k, columns_used, m, L, lowest, gathered, weights, scale, c
-                    )
-            for start in range(low, high, RINGS):
-                inside = load_start(starts[j], start, 1.0, state[0], state[1], state[2])
-                is_north = rings[2][start] < 1.0
-                x = (rings[3] if is_north else rings[1])[start : start + RINGS]
-                shift = recursion[3] if is_north else recursion[4]
-                sum_block(
-                    first,
-                    lowest,
-                    L,
-                    columns_used,
-                    PADDING,
-                    inside,
-                    a,
-                    shift,
-                    c,
-                    x,
-                    state[0],
-                    state[1],
-                    state[2],
-                    sums,
+            a, exponents = recursion[0], recursion[2]
+            active, columns_used = total // flm.shape[0], min(2 * total, 4)
+            for t in range(total):
+                slot, k = _slot_of(run, m, sides, t % active), 2 * (t % 2)
+                source = gathered[t // active]
+                _fill_coefficients(
+                    run, slot, k, columns_used, m, L, lowest, source, weights, exponents, c[t // 2]
                 )
-                for slot in range(2):
-                    if _is_active(run, slot, m, sides):
-                        k = columns_used - 2 if slot == 1 else 0
-                        _store_block(run, slot, k, start, sums, series)
-        _mix_series(m, padded - RINGS, mixing, series, mixed, columns)
+            if total > 2 and total & 1:
+                _clear_partner(first, L, c[total // 2])
+            used = places[: (total + 1) // 2]
+            for start in range(low, high, RINGS):
+                inside = load_start(starts[j], start, 1.0, before, now, scale)
+                is_north = _load_argument(rings, start, work)
+                shift = recursion[3] if is_north else recursion[4]
+                if total <= 2:
+                    sum_block(
+                        first,
+                        lowest,
+                        L,
+                        columns_used,
+                        PADDING,
+                        inside,
+                        a,
+                        shift,
+                        c[0],
+                        work[3 * RINGS : 4 * RINGS],
+                        before,
+                        now,
+                        scale,
+                        sums,
+                    )
+                    copy_sums(sums, columns_used, start, used, padded, rows)
+                else:
+                    sum_quartets(
+                        first,
+                        lowest,
+                        L,
+                        PADDING,
+                        inside,
+                        start,
+                        used,
+                        padded,
+                        a,
+                        shift,
+                        c,
+                        work,
+                        values,
+                        rows,
+                    )
+        for i in range(flm.shape[0]):
+            _mix_series(m, padded - RINGS, mixing, series[i], mixed, columns[i])
+
+
+@kernel
+def _block_room(pairs, size):
+    """Return room for a block of rings: its start and sums, values, and rows of all series."""
+    work = np.empty(5 * RINGS)
+    start = work[:RINGS], work[RINGS : 2 * RINGS], work[2 * RINGS : 3 * RINGS]
+    places = np.empty((pairs, 2), dtype=np.int64)
+    columns = np.empty(4 * RINGS), np.empty(4 * RINGS)
+    return (*start, *columns), work, np.empty(CHUNK * RINGS), places, np.zeros(size)
 
 
 @kernel
 def fill_columns(
     first_m, stop_m, L, lowest, sides, flm, weights, runs, mixing, rings, windows, tables, columns
 ):
-    """Fill columns[k, m, ring] = sum_i mixing[k, i] sum_l weights[i, l] f_lm d^l_{m, n_i}(theta).
+    """Fill columns[., k, m, ring] = sum_i mixing[k, i] sum_l weights[i, l] f_lm d^l_{m, n_i}.
 
-    flm: (1 or orders, L*L); weights: (orders, L) complex; mixing: (outputs, orders) complex;
-    rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows: (2, L)
-    first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k); columns:
-    (outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
+    flm: (maps, 1 or orders, at least L*L); weights: (orders, L) complex; mixing: (outputs, orders)
+    complex; rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows:
+    (2, L) first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k);
+    columns: (maps, outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
     """
-    n_orders, n_runs = weights.shape[0], runs.shape[0]
-    mirrored = max(runs[:, 3].max(), runs[:, 6].max())
-    padded = rings[0].size
+    n_maps, n_orders, n_runs = flm.shape[0], weights.shape[0], runs.shape[0]
+    halves, padded = max(runs[:, 3].max(), runs[:, 6].max()) + 1, rings[0].size
+    size = n_maps * n_orders * sides * halves * 2 * padded
+    blocks = _block_room(n_maps, size + 2 * padded)
     room = (
         _recursion_room(L),
-        np.empty(4 * (L + PADDING)),
-        np.empty(4 * RINGS),
-        np.empty((3, RINGS)),
-        np.empty((6, padded)),
-        np.empty((n_runs, 2, padded)),
-        np.empty((flm.shape[0], sides, L), dtype=np.complex128),
-        np.zeros((n_orders, sides, mirrored + 1, 2, padded)),
+        blocks,
+        (np.empty((6, padded)), np.empty((n_runs, 2, padded))),
+        np.empty((n_maps, flm.shape[1], sides, L), dtype=np.complex128),
+        blocks[4][:size].reshape((n_maps, n_orders, sides, halves, 2, padded)),
         np.empty((2, padded)),
+        np.empty((n_maps, 4 * (L + PADDING))),
     )
     _fill_orders(
         first_m,
@@ -285,19 +357,37 @@ def fill_columns(
 
 
 @inner
-def _load_block(run, slot, k, m, start, n_rings, columns, g):
-    """Copy one series' rings of order sigma m into g, zero beyond the last ring."""
+def _load_rows(run, slot, m, low, high, n_rings, columns, stride, rows):
+    """Copy one series' rings of order sigma m into two rows, zero beyond the last ring."""
     i, sigma, mirrored = run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
     total = columns.shape[2]
     source = columns[i, m if sigma > 0 or m == 0 else columns.shape[1] - m]
-    for r in range(RINGS):
-        ring = start + r
-        value = 0.0j
-        # The equator of a symmetric grid is its own mirror image: it counts once.
-        if ring < n_rings and not (mirrored == 1 and 2 * ring + 1 == total):
-            value = source[total - 1 - ring if mirrored == 1 else ring]
-        g[k * RINGS + r] = value.real
-        g[(k + 1) * RINGS + r] = value.imag
+    last = min(high, n_rings)
+    for r in range(low, last):
+        value = source[total - 1 - r if mirrored == 1 else r]
+        rows[r] = value.real
+        rows[stride + r] = value.imag
+    # The equator of a symmetric grid is its own mirror image: it counts once.
+    if mirrored == 1 and 2 * last - 1 == total:
+        last -= 1
+    rows[last:high] = 0.0
+    rows[stride + last : stride + high] = 0.0
+
+
+@inner
+def _load_series(run, m, sides, low, high, n_rings, columns, stride, places, rows):
+    """Copy all series of a run; return their number."""
+    active = _count_active(run, m, sides)
+    total = columns.shape[0] * active
+    for t in range(total + (total & 1)):
+        place = 2 * t * stride
+        places[t // 2, t % 2] = place
+        if t == total:
+            rows[place : place + 2 * stride] = 0.0
+        else:
+            slot, given = _slot_of(run, m, sides, t % active), columns[t // active]
+            _load_rows(run, slot, m, low, high, n_rings, given, stride, rows[place:])
+    return total
 
 
 @inner
@@ -320,12 +410,14 @@ def _add_orders(
     first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    recursion, sums, g, masked, state, powers, starts = room
+    recursion, sums, blocks, (powers, starts) = room
+    (before, now, scale, g, masked), work, values, places, rows = blocks
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
+        filled = 2 * L
         is_new = m == first_m or m % M_CHUNK == 0
         low, high = windows[0, m], windows[1, m]
-        filled = 2 * L
+        covered = low + (high - low + RINGS - 1) // RINGS * RINGS
         for j in range(n_runs):
             run = runs[j]
             n = run[0]
@@ -335,64 +427,92 @@ def _add_orders(
                 # The last block of any later m, too, ends there.
                 stop = high + RINGS
                 prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
-            columns_used = 0
-            for slot in range(2):
-                columns_used += 2 if _is_active(run, slot, m, sides) else 0
-            if columns_used == 0 or is_empty:
+            if is_empty:
+                continue
+            total = _load_series(
+                run, m, sides, low, covered, padded - RINGS, columns, padded, places, rows
+            )
+            if total == 0:
                 continue
             _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
             filled = n
-            a, scale = recursion[0], recursion[2]
-            sums[first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
+            a, exponents = recursion[0], recursion[2]
+            active, columns_used = total // columns.shape[0], min(2 * total, 4)
+            used = places[: (total + 1) // 2]
+            for q in range(used.shape[0]):
+                sums[q, first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
             for start in range(low, high, RINGS):
-                inside = load_start(starts[j], start, 1.0, state[0], state[1], state[2])
-                for slot in range(2):
-                    if _is_active(run, slot, m, sides):
-                        k = columns_used - 2 if slot == 1 else 0
-                        _load_block(run, slot, k, m, start, padded - RINGS, columns, g)
-                is_north = rings[2][start] < 1.0
-                x = (rings[3] if is_north else rings[1])[start : start + RINGS]
+                inside = load_start(starts[j], start, 1.0, before, now, scale)
+                is_north = _load_argument(rings, start, work)
                 shift = recursion[3] if is_north else recursion[4]
-                add_block_to_degrees(
-                    first,
-                    lowest,
-                    L,
+                if total <= 2:
+                    copy_rows(rows, columns_used, start, used, padded, g)
+                    add_block_to_degrees(
+                        first,
+                        lowest,
+                        L,
+                        columns_used,
+                        PADDING,
+                        inside,
+                        a,
+                        shift,
+                        g,
+                        masked,
+                        work[3 * RINGS : 4 * RINGS],
+                        before,
+                        now,
+                        scale,
+                        sums[0],
+                    )
+                else:
+                    add_quartets_to_degrees(
+                        first,
+                        lowest,
+                        L,
+                        PADDING,
+                        inside,
+                        start,
+                        used,
+                        padded,
+                        a,
+                        shift,
+                        rows,
+                        work,
+                        values,
+                        sums,
+                    )
+            for t in range(total):
+                slot, k, target = _slot_of(run, m, sides, t % active), 2 * (t % 2), flm[t // active]
+                _collect(
+                    run,
+                    slot,
+                    k,
                     columns_used,
-                    PADDING,
-                    inside,
-                    a,
-                    shift,
-                    g,
-                    masked,
-                    x,
-                    state[0],
-                    state[1],
-                    state[2],
-                    sums,
+                    m,
+                    L,
+                    lowest,
+                    weights,
+                    exponents,
+                    sums[t // 2],
+                    target,
                 )
-            for slot in range(2):
-                if _is_active(run, slot, m, sides):
-                    k = columns_used - 2 if slot == 1 else 0
-                    _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm)
 
 
 @kernel
 def add_columns_to_harmonics(
     first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, flm
 ):
-    """f_lm += sum_i weights[i, l] sum_ring d^l_{m, n_i}(theta) columns[i, m, ring].
+    """f_lm += sum_i weights[i, l] sum_ring d^l_{m, n_i}(theta) columns[., i, m, ring].
 
-    columns: (at least orders, n_m, all rings); flm: (1 or orders, L*L); the rest as in
-    `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
+    columns: (maps, at least orders, n_m, all rings); flm: (maps, 1 or orders, at least L*L); the
+    rest as in `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
     """
+    n_maps, padded = flm.shape[0], rings[0].size
     room = (
         _recursion_room(L),
-        np.empty(4 * WIDTH * (L + PADDING)),
-        np.empty(4 * RINGS),
-        np.empty(4 * RINGS),
-        np.empty((3, RINGS)),
-        np.empty((6, rings[0].size)),
-        np.empty((runs.shape[0], 2, rings[0].size)),
+        np.empty((n_maps, 4 * WIDTH * (L + PADDING))),
+        _block_room(n_maps, 4 * n_maps * padded),
+        (np.empty((6, padded)), np.empty((runs.shape[0], 2, padded))),
     )
     _add_orders(
         first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
