@@ -9,7 +9,8 @@ into orientations) are this one sum; the transforms differ in weights and mixing
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,10 @@ Array = np.ndarray[Any, Any]
 # so few rings that columns are read in pieces shorter than a few cache lines.
 _TASK_BYTES = 2**19
 _FEWEST_RINGS = 16
+# Maps that go through the sums together, and bytes of their Fourier columns: with more maps values
+# made once save little more, and columns leave the cache.
+_MOST_MAPS = 4
+_COLUMN_BYTES = 2**26
 # Such batches that a thread has at a time, while circles are shifted.
 _SCRATCH_ARRAYS = 4
 
@@ -56,6 +61,13 @@ def fill_negative_orders(flm: Array) -> None:
     fill_negative_m(int(np.sqrt(flm.shape[-1])), flm.reshape(-1, flm.shape[-1]))
 
 
+def _ranges(call: Callable[[int, int], None], size: int, step: int) -> list[Callable[[], None]]:
+    """Split what is called for a range into calls for parts of it."""
+    return [
+        functools.partial(call, first, min(first + step, size)) for first in range(0, size, step)
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class GridSums:
     """The sums for fixed orders on a fixed grid.
@@ -74,7 +86,7 @@ class GridSums:
         Threads to share the work.
     dtype : str, default "complex128"
         Type that Fourier columns and complex maps are stored in; all sums are of double precision.
-    workspace : ndarray, shape (at least `workspace_size`,), of that type, optional
+    workspace : ndarray, shape (at least `workspace_size` of the batch,), of that type, optional
         Room for the Fourier columns: fresh memory costs as much as the transform that fills it.
     """
 
@@ -99,9 +111,18 @@ class GridSums:
         return OrderSums(self.orders, weights, lowest, 1 if self.real else 2, self._threads)
 
     @property
-    def workspace_size(self) -> int:
-        """Complex numbers that hold the Fourier columns of all outputs."""
-        return max(self.mixing.shape) * self._n_m * self.sampling.n_rings
+    def _columns_shape(self) -> tuple[int, int, int]:
+        return (max(self.mixing.shape), self._n_m, self.sampling.n_rings)
+
+    @property
+    def _maps_together(self) -> int:
+        """Maps that go through the sums at once: they share recursions, and add up in memory."""
+        fitting = _COLUMN_BYTES // (16 * math.prod(self._columns_shape))
+        return min(_MOST_MAPS, max(1, fitting))
+
+    def workspace_size(self, batch: int = 1) -> int:
+        """Return how many complex numbers hold the Fourier columns of all outputs."""
+        return min(batch, self._maps_together) * math.prod(self._columns_shape)
 
     @property
     def scratch_bytes(self) -> int:
@@ -111,10 +132,9 @@ class GridSums:
         circles = (self._n_m + 1) // 2 * circle
         return _SCRATCH_ARRAYS * min(batches, circles)
 
-    @property
-    def working_bytes(self) -> int:
-        """Bytes that a call takes beyond its input and output."""
-        return np.dtype(self.dtype).itemsize * self.workspace_size + self.scratch_bytes
+    def working_bytes(self, batch: int = 1) -> int:
+        """Return the bytes that a call takes beyond its input and output."""
+        return np.dtype(self.dtype).itemsize * self.workspace_size(batch) + self.scratch_bytes
 
     @property
     def maps_itemsize(self) -> int:
@@ -131,16 +151,15 @@ class GridSums:
         """Shape of the output maps."""
         return (self.mixing.shape[0], *self.sampling.shape)
 
-    def _columns(self) -> Array:
+    def _columns(self, maps: int) -> Array:
         """Return room for the Fourier columns of all outputs, in the workspace if there is one."""
-        shape = (max(self.mixing.shape), self._n_m, self.sampling.n_rings)
-        room = self.workspace
+        room, size = self.workspace, self.workspace_size(maps)
         if room is None:
-            room = np.empty(self.workspace_size, dtype=self.dtype)
-        columns = room[: self.workspace_size].reshape(shape)
+            room = np.empty(size, dtype=self.dtype)
+        columns = room[:size].reshape(maps, *self._columns_shape)
         # MWSS has one more Fourier mode, |m| = L, than a band-limited signal.
         if self.sampling.n_phi == 2 * self.sampling.bandlimit:
-            columns[:, self.sampling.bandlimit] = 0.0
+            columns[:, :, self.sampling.bandlimit] = 0.0
         return columns
 
     @property
@@ -157,28 +176,38 @@ class GridSums:
         if mirror is None:
             engine_of(self.sampling).fill_columns(flm, sums, mixing, columns)
             return
-        mirror.fill_columns(flm, sums, columns[:1])
-        clear_outer_rings(mirror.limits, sums.sides, columns[0])
-        if not np.array_equal(mixing, [[1.0]]):
-            self._mix(mixing, columns)
+        for given, room in self._single_rows(flm, columns):
+            mirror.fill_columns(given, sums, room)
+        for one in columns:
+            clear_outer_rings(mirror.limits, sums.sides, one[0])
+            if not np.array_equal(mixing, [[1.0]]):
+                self._mix(mixing, one)
 
     def _add_columns(self, columns: Array, sums: OrderSums, out: Array) -> None:
         mirror = self._mirror
         if mirror is None:
             engine_of(self.sampling).add_to_harmonics(columns, sums, out)
+            return
+        for given, room in self._single_rows(out, columns):
+            mirror.add_to_harmonics(room, sums, given)
+
+    @staticmethod
+    def _single_rows(flm: Array, columns: Array) -> Iterator[tuple[Array, Array]]:
+        """Give the coefficients and the first columns of maps that lie side by side in memory."""
+        if columns.shape[1] == 1:
+            yield flm[:, 0], columns[:, 0]
         else:
-            mirror.add_to_harmonics(columns[:1], sums, out)
+            yield from ((one, several[:1]) for one, several in zip(flm, columns, strict=True))
 
     def _share(self, call: Callable[[int, int], None], size: int, step: int) -> None:
-        tasks = [
-            functools.partial(call, first, min(first + step, size))
-            for first in range(0, size, step)
-        ]
-        run_tasks(tasks, self._threads)
+        run_tasks(_ranges(call, size, step), self._threads)
 
-    def _share_rings(self, call: Callable[[int, int], None], outputs: int) -> None:
+    def _share_rings(self, call: Callable[[int, int, int], None], maps: int, outputs: int) -> None:
+        """Call for ranges of rings of every map."""
         step = max(_FEWEST_RINGS, _TASK_BYTES // (16 * self.sampling.n_phi * outputs))
-        self._share(call, self.sampling.n_rings, step)
+        calls = [functools.partial(call, i) for i in range(maps)]
+        tasks = [task for one in calls for task in _ranges(one, self.sampling.n_rings, step)]
+        run_tasks(tasks, self._threads)
 
     def _mix(self, mixing: Array, columns: Array) -> None:
         from spinsdw.compiled.columns import mix_columns
@@ -194,27 +223,47 @@ class GridSums:
         quadrature: bool = False,
         out: Array | None = None,
     ) -> Array:
-        """Return maps, shape (outputs, rings, phi), from flm (1 or orders, L*L).
+        """Return maps, shape (outputs, rings, phi), from flm (1 or orders, at least L*L).
 
         ``weights``: (orders, L) complex. With ``quadrature`` the grid's quadrature is applied to
         the columns of every order first: that is the adjoint of an analysis. The maps go to
         ``out`` where it is given.
         """
-        columns = self._columns()
+        maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
+        self.fill_maps(flm[None], weights, maps[None], lowest=lowest, quadrature=quadrature)
+        return maps
+
+    def fill_maps(
+        self, flm: Array, weights: Array, out: Array, *, lowest: int = 0, quadrature: bool = False
+    ) -> None:
+        """Fill maps, shape (batch, outputs, rings, phi), each as `to_grid` does, some together."""
         sums = self._order_sums(weights, lowest)
+        for part in self._parts(len(flm)):
+            self._fill_together(flm[part], sums, out[part], quadrature=quadrature)
+
+    def _parts(self, batch: int) -> list[slice]:
+        step = self._maps_together
+        return [slice(first, first + step) for first in range(0, batch, step)]
+
+    def _fill_together(self, flm: Array, sums: OrderSums, maps: Array, *, quadrature: bool) -> None:
+        columns = self._columns(len(flm))
         if quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
             self._fill_columns(flm, sums, identity, columns)
-            self.sampling.weigh_columns(
-                columns, self.orders, mixing=identity, threads=self._threads
-            )
-            self._mix(self.mixing, columns)
+            for one in columns:
+                self._weigh(one, identity)
+                self._mix(self.mixing, one)
         else:
             self._fill_columns(flm, sums, self.mixing, columns)
         outputs = self.mixing.shape[0]
-        maps = np.empty(self.maps_shape, dtype=self.maps_dtype) if out is None else out
-        self._share_rings(lambda a, b: fill_maps(columns[:outputs, :, a:b], maps[:, a:b]), outputs)
-        return maps
+        self._share_rings(
+            lambda i, a, b: fill_maps(columns[i, :outputs, :, a:b], maps[i, :, a:b]),
+            len(maps),
+            outputs,
+        )
+
+    def _weigh(self, columns: Array, mixing: Array) -> None:
+        self.sampling.weigh_columns(columns, self.orders, mixing=mixing, threads=self._threads)
 
     def from_grid(
         self,
@@ -225,20 +274,31 @@ class GridSums:
         lowest: int = 0,
         quadrature: bool = False,
     ) -> None:
-        """Add to ``out`` (1 or orders, L*L) the adjoint sum of `to_grid` for conjugated weights.
+        """Add to ``out`` (1 or orders, at least L*L) the adjoint of `to_grid`, weights conjugated.
 
         With ``quadrature`` the sum over rings becomes the exact integral over the sphere.
         """
-        columns = self._columns()
+        self.add_maps(maps[None], weights, out[None], lowest=lowest, quadrature=quadrature)
+
+    def add_maps(
+        self, maps: Array, weights: Array, out: Array, *, lowest: int = 0, quadrature: bool = False
+    ) -> None:
+        """Add what a batch of maps holds, each as `from_grid` does, some together."""
+        sums = self._order_sums(weights, lowest)
+        for part in self._parts(len(maps)):
+            self._add_together(maps[part], sums, out[part], quadrature=quadrature)
+
+    def _add_together(self, maps: Array, sums: OrderSums, out: Array, *, quadrature: bool) -> None:
+        columns, outputs = self._columns(len(maps)), maps.shape[1]
         self._share_rings(
-            lambda a, b: fill_maps_columns(maps[:, a:b], columns[: maps.shape[0], :, a:b]),
-            maps.shape[0],
+            lambda i, a, b: fill_maps_columns(maps[i, :, a:b], columns[i, :outputs, :, a:b]),
+            len(maps),
+            outputs,
         )
         unmixing = np.ascontiguousarray(self.mixing.conj().T)
-        if quadrature:
-            self.sampling.weigh_columns(
-                columns, self.orders, mixing=unmixing, threads=self._threads
-            )
-        elif not np.array_equal(unmixing, [[1.0]]):
-            self._mix(unmixing, columns)
-        self._add_columns(columns, self._order_sums(weights, lowest), out)
+        for one in columns:
+            if quadrature:
+                self._weigh(one, unmixing)
+            elif not np.array_equal(unmixing, [[1.0]]):
+                self._mix(unmixing, one)
+        self._add_columns(columns, sums, out)

@@ -62,10 +62,10 @@ class OrientationSums:
     dtype: str = "complex128"
     workspace: Array | None = None
 
-    @property
-    def workspace_size(self) -> int:
-        """Complex numbers that hold the Fourier columns of a few orders."""
-        return max((sums.workspace_size for sums, *_ in self._groups()), default=0)
+    def workspace_size(self, batch: int = 1) -> int:
+        """Return how many complex numbers hold the Fourier columns of a few orders of one map."""
+        sizes = (sums.workspace_size(min(batch, 1)) for sums, *_ in self._groups())
+        return max(sizes, default=0)
 
     @property
     def scratch_bytes(self) -> int:
@@ -165,3 +165,20 @@ class OrientationSums:
             )
         if self.real:
             out += target + conjugate_field(target)
+
+    def fill_maps(
+        self, flm: Array, weights: Array, out: Array, *, lowest: int = 0, quadrature: bool = False
+    ) -> None:
+        """Fill a batch of maps one by one; as `GridSums.fill_maps`."""
+        size = self.sampling.bandlimit**2
+        for one, maps in zip(flm, out, strict=True):
+            self.to_grid(one[:, :size], weights, lowest=lowest, quadrature=quadrature, out=maps)
+
+    def add_maps(
+        self, maps: Array, weights: Array, out: Array, *, lowest: int = 0, quadrature: bool = False
+    ) -> None:
+        """Add what a batch of maps holds one by one; as `GridSums.add_maps`."""
+        size = self.sampling.bandlimit**2
+        for one, flm in zip(maps, out, strict=True):
+            target = flm[:, :size]
+            self.from_grid(one, weights, out=target, lowest=lowest, quadrature=quadrature)

@@ -54,13 +54,11 @@ class ScaleSums:
         ``adjoint`` is that of the synthesis; flm has the shape (..., L*L), L at least the grid's.
         """
         weights = self.dual.conj() * self._integration if adjoint else self.psi.conj()
-        batch, size = flm.reshape(-1, flm.shape[-1]), self.sums.sampling.bandlimit**2
+        batch = flm.reshape(-1, 1, flm.shape[-1])
         maps = np.zeros((len(batch), *self.sums.maps_shape), dtype=self.sums.maps_dtype)
         if self.sums.orders:
             sums = replace(self.sums, workspace=workspace)
-            call = functools.partial(sums.to_grid, lowest=self.lowest, quadrature=adjoint)
-            for one, out in zip(batch, maps, strict=True):
-                call(one[None, :size], weights, out=out)
+            sums.fill_maps(batch, weights, maps, lowest=self.lowest, quadrature=adjoint)
         return maps.reshape(*flm.shape[:-1], *self.sums.maps_shape)
 
     def add_to_harmonics(
@@ -74,10 +72,8 @@ class ScaleSums:
             return
         weights = self.psi if adjoint else self.dual * self._integration
         sums = replace(self.sums, workspace=workspace)
-        call = functools.partial(sums.from_grid, lowest=self.lowest, quadrature=not adjoint)
-        rows, size = values.reshape(-1, *self.sums.maps_shape), self.sums.sampling.bandlimit**2
-        for one, out in zip(rows, flm, strict=True):
-            call(one, weights, out=out[None, :size])
+        rows = values.reshape(-1, *self.sums.maps_shape)
+        sums.add_maps(rows, weights, flm[:, None], lowest=self.lowest, quadrature=not adjoint)
 
 
 def scale_sums(

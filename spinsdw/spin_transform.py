@@ -160,7 +160,7 @@ class SpinHarmonicTransform:
         batch = check_integer(batch, "batch", minimum=0)
         flm = batch * 16 * self.bandlimit**2
         maps = batch * math.prod(self.shape) * self._sums.maps_itemsize
-        working = self._sums.working_bytes
+        working = self._sums.working_bytes(batch)
         there, back = MemoryEstimate(flm, maps, working), MemoryEstimate(maps, flm, working)
         return {
             "synthesis": there,
@@ -178,8 +178,7 @@ class SpinHarmonicTransform:
         flm = writable(check_flm(flm, self.bandlimit))
         batch = flm.reshape(-1, flm.shape[-1])
         maps = np.empty((batch.shape[0], *self.shape), dtype=self._sums.maps_dtype)
-        for one, out in zip(batch, maps, strict=True):
-            self._sums.to_grid(one[None], self._weights, quadrature=quadrature, out=out[None])
+        self._sums.fill_maps(batch[:, None], self._weights, maps[:, None], quadrature=quadrature)
         return maps.reshape(*flm.shape[:-1], *self.shape)
 
     def _to_coefficients(self, maps: Array, *, quadrature: bool) -> Array:
@@ -187,8 +186,7 @@ class SpinHarmonicTransform:
         maps = check_map(maps, self.shape, real=self.real, may_be_single=True)
         batch = maps.reshape(-1, *self.shape)
         flm = np.zeros((batch.shape[0], self.bandlimit**2), dtype=np.complex128)
-        for one, out in zip(batch, flm, strict=True):
-            self._sums.from_grid(one[None], self._weights, out=out[None], quadrature=quadrature)
+        self._sums.add_maps(batch[:, None], self._weights, flm[:, None], quadrature=quadrature)
         if self.real:
             fill_negative_orders(flm)
         return flm.reshape(*maps.shape[:-2], self.bandlimit**2)

@@ -264,9 +264,9 @@ class SpinWaveletTransform(WaveletFrame):
         pair, harmonic = (self.wavelets, self._dual), self.harmonic
         return {j: scale_sums(*pair, j, self.part_grid(j), harmonic) for j in self.scales}
 
-    def _workspace(self) -> Array:
+    def _workspace(self, batch: int) -> Array:
         """Return room for the Fourier columns of any scale."""
-        largest = max(one.sums.workspace_size for one in self._scale_sums.values())
+        largest = max(one.sums.workspace_size(batch) for one in self._scale_sums.values())
         return np.empty(largest, dtype=self.dtype)
 
     def memory_estimate(self, batch: int = 1) -> dict[str, MemoryEstimate]:
@@ -299,7 +299,7 @@ class SpinWaveletTransform(WaveletFrame):
         sums = [one.sums for one in self._scale_sums.values()]
         wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
         scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
-        room = np.dtype(self.dtype).itemsize * max(one.workspace_size for one in sums)
+        room = np.dtype(self.dtype).itemsize * max(one.workspace_size(batch) for one in sums)
         working = room + max(one.scratch_bytes for one in sums)
         # The scaling part has coefficients of its own: on the way there before any scale has.
         part = scaling.input + scaling.working
@@ -329,7 +329,7 @@ class SpinWaveletTransform(WaveletFrame):
     ) -> WaveletCoefficients:
         """Analyse every part, each from the harmonic coefficients ``flm_of`` gives for it."""
         scaling = self._scaling_sums.to_grid(flm_of("scaling"), adjoint=adjoint)
-        workspace = self._workspace()
+        workspace = self._workspace(math.prod(scaling.shape[:-2]))
         wavelets = {
             j: sums.to_grid(flm_of(j), workspace, adjoint=adjoint)
             for j, sums in self._scale_sums.items()
@@ -348,7 +348,7 @@ class SpinWaveletTransform(WaveletFrame):
         wanted = set(self.shapes) if parts is None else check_wanted(parts, self.shapes)
         flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
         rows = flm.reshape(-1, self.bandlimit**2)
-        workspace = self._workspace()
+        workspace = self._workspace(len(rows))
         for j, sums in self._scale_sums.items():
             if j in wanted:
                 sums.add_to_harmonics(checked[j], rows, workspace, adjoint=adjoint)

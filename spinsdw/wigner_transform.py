@@ -172,8 +172,8 @@ class WignerTransform:
         sums = self._sums
         coefficients = batch * 16 * len(self.orders) * self.bandlimit**2
         functions = batch * math.prod(self.shape) * sums.maps_itemsize
-        there = MemoryEstimate(coefficients, functions, sums.working_bytes)
-        back = MemoryEstimate(functions, coefficients, sums.working_bytes)
+        there = MemoryEstimate(coefficients, functions, sums.working_bytes())
+        back = MemoryEstimate(functions, coefficients, sums.working_bytes())
         return {
             "synthesis": there,
             "analysis": back,
@@ -324,7 +324,7 @@ class WignerTransform:
         weights = self._correlation_weights(glm)
         batch, sums = values.reshape(-1, self.bandlimit**2), self._sums
         size = batch.shape[0] * math.prod(self.shape) * sums.maps_itemsize
-        estimate = MemoryEstimate(values.nbytes, size, sums.working_bytes)
+        estimate = MemoryEstimate(values.nbytes, size, sums.working_bytes())
         estimate.require(self.max_memory, "correlate")
         out = np.empty((batch.shape[0], *self.shape), dtype=sums.maps_dtype)
         for one, function in zip(batch, out, strict=True):

@@ -256,3 +256,25 @@ def test_pairs_of_orders_share_one_pass():
     """d^l_{-m,-n} = (-1)^(m-n) d^l_mn: two passes serve the pair +-n, one pass n = 0."""
     assert len(make_runs((-2, 0, 2))) == 3
     assert len(make_runs((-3, -1, 1, 3))) == 4
+
+
+@pytest.mark.parametrize("orders", ORDERS)
+@pytest.mark.parametrize("is_symmetric", [False, True])
+@pytest.mark.parametrize("maps", [2, 3, 4])
+def test_maps_of_a_batch_have_the_bits_of_single_ones(maps, is_symmetric, orders):
+    """Values shared by all maps, an odd number of series too: the same sums in the same order."""
+    bandlimit = 40 if not IS_UNCOMPILED else 7
+    engine = RingEngine(bandlimit, np.linspace(0, np.pi / 2, 9), symmetric=is_symmetric)
+    rings = 17 if is_symmetric else 9
+    _, weights, mixing = problem(bandlimit, orders)
+    sums = OrderSums(orders, weights, lowest=3)
+    flm = random_complex(maps, 1, bandlimit**2, seed=5)
+    columns = np.full((maps, len(orders), 2 * bandlimit - 1, rings), np.nan, dtype=complex)
+    engine.fill_columns(flm, sums, mixing, columns)
+    noise, out = random_like(columns, seed=6), random_like(flm, seed=7)
+    singles = out.copy()
+    engine.add_to_harmonics(noise, sums, out)
+    for i in range(maps):
+        assert np.array_equal(columns[i], fill(engine, flm[i], sums, mixing, rings))
+        engine.add_to_harmonics(noise[i], sums, singles[i])
+    assert np.array_equal(out, singles)

@@ -113,8 +113,8 @@ def test_leading_axes_are_a_batch(batch, real):
     assert back.shape == (*batch, 25)
     for place in np.ndindex(*batch):
         # Fourier transforms of several lines at once round in another order.
-        assert_close(maps[place], transform.synthesis(flm[place]), ulps=16)
-        assert_close(back[place], transform.adjoint_synthesis(maps[place]), ulps=16)
+        assert np.array_equal(maps[place], transform.synthesis(flm[place]))
+        assert np.array_equal(back[place], transform.adjoint_synthesis(maps[place]))
 
 
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])
