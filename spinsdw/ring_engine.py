@@ -25,13 +25,17 @@ OrderCall = Callable[[int, int], None]
 _NEGLIGIBLE = 45.0
 # Axes of the coefficients of one signal: sources, (l, m).
 _SINGLE = 2
+# Ranges of orders for each thread.
+_RANGES = 8
 
 
 def share_orders(call: OrderCall, bandlimit: int, threads: int) -> None:
     """Call for ranges of orders that cover 0 <= m < bandlimit, on ``threads`` threads."""
     from spinsdw.compiled.order_sums import M_CHUNK
 
-    step = bandlimit if threads == 1 else M_CHUNK
+    # Fewer ranges are fewer calls; the last are short work all the same, for their m is large.
+    step = M_CHUNK * max(1, bandlimit // (M_CHUNK * _RANGES * threads))
+    step = bandlimit if threads == 1 else step
     ranges = [(m, min(m + step, bandlimit)) for m in range(0, bandlimit, step)]
     run_tasks([functools.partial(call, *one) for one in ranges], threads)
 

@@ -28,8 +28,6 @@ from spinsdw.compiled.ring_sums import (
     CHUNK,
     add_block_to_degrees,
     add_quartets_to_degrees,
-    copy_rows,
-    copy_sums,
     sum_block,
     sum_quartets,
 )
@@ -108,12 +106,12 @@ def _fill_coefficients(m, count, series, mixers, c):
 
 
 @inner
-def _store_rows(first, low, stop, rows, cosine, factor, column):
-    """Write both hemispheres of rings low <= r < stop into a column."""
+def _store_rows(first, low, stop, part, cosine, factor, column):
+    """Write both hemispheres of rings low <= r < stop into a column; part[:, 0] is of ``low``."""
     count = stop - low
     north = column[first + low : first + stop]
     south = column[column.size - first - stop : column.size - first - low]
-    x, size, part = cosine[low:stop], factor[low:stop], rows[:, low:stop]
+    x, size = cosine[low:stop], factor[low:stop]
     for r in range(count):
         even = complex(part[0, r], part[1, r])
         odd = x[r] * complex(part[2, r], part[3, r])
@@ -179,7 +177,7 @@ def _fill_orders(
     first_m, stop_m, L, sides, n, first_ring, flm, weights, rings, windows, tables, room, columns
 ):
     """Fill the columns of some orders; ``room`` is what `fill_mirrored_columns` allocates."""
-    (recursion, powers, starts), (mixers, factors, series), quartets, flat, sums, c = room
+    (recursion, powers, starts), (mixers, factors, series), quartets, block, sums, c = room
     places, rows, work, values = quartets
     before, now, scale, x = _rows_of(work)
     padded, n_m = rings[0].size, columns.shape[1]
@@ -209,7 +207,8 @@ def _fill_orders(
             last = _fill_series(m, q % n_sides, n, L, factors, flm[q // n_sides], weights, series)
             _fill_coefficients(m, count, series[last], mixers, c[q])
         used_places = places[:used]
-        rows[:used] = 0.0
+        if used > 1:
+            rows[:used] = 0.0
         for start in range(low, high, RINGS):
             is_polar = _load_argument(rings, start, x)
             shift = recursion[2] if is_polar else recursion[1]
@@ -231,7 +230,8 @@ def _fill_orders(
                     scale,
                     sums,
                 )
-                copy_sums(sums, 4, start, used_places, padded, flat)
+                stop = min(start + RINGS, n_rings)
+                _store_rows(first_ring, start, stop, block, rings[5], rings[6], columns[0, m])
             else:
                 sum_quartets(
                     0,
@@ -249,10 +249,12 @@ def _fill_orders(
                     values,
                     rows,
                 )
-        stop = min(_end_of_blocks(low, high), n_rings)
-        for q in range(used):
-            column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
-            _store_rows(first_ring, low, stop, rows[q], rings[5], rings[6], column)
+        if used > 1:
+            stop = min(_end_of_blocks(low, high), n_rings)
+            for q in range(used):
+                column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
+                part = rows[q][:, low:]
+                _store_rows(first_ring, low, stop, part, rings[5], rings[6], column)
 
 
 @kernel
@@ -267,13 +269,13 @@ def fill_mirrored_columns(
     binomials, 1 / k, 1 / sqrt(2k + 1), (|n|, 3, L) the parts of U_l, V_l, W_l that depend on l and
     n); columns: (maps, n_m, all rings), of m >= 0 only for ``sides`` = 1.
     """
-    quartets = _quartets(sides * flm.shape[0], rings[0].size)
+    quartets, sums = _quartets(sides * flm.shape[0], rings[0].size), np.empty(4 * RINGS)
     room = (
         _workspace(L, n, rings[0].size),
         _series_workspace(L, n),
         quartets,
-        quartets[1].reshape(-1),
-        np.empty(4 * RINGS),
+        sums.reshape(4, RINGS),
+        sums,
         np.empty((sides * flm.shape[0], 4 * (L + abs(n) + PADDING))),
     )
     _fill_orders(
@@ -294,13 +296,13 @@ def fill_mirrored_columns(
 
 
 @inner
-def _load_rows(first, low, stop, n_rings, column, cosine, factor, rows):
+def _load_rows(first, low, stop, n_rings, column, cosine, factor, part):
     """Split rings low <= r < stop of a column into even and odd parts, zero beyond the last."""
     total, last = column.size, min(stop, n_rings)
     count = last - low
     north = column[first + low : first + last]
     south = column[total - first - last : total - first - low]
-    x, size, part = cosine[low:last], factor[low:last], rows[:, low:stop]
+    x, size = cosine[low:last], factor[low:last]
     for r in range(count):
         here, mirrored = size[r] * north[r], size[r] * south[count - 1 - r]
         even, odd = here + mirrored, x[r] * (here - mirrored)
@@ -316,7 +318,7 @@ def _load_rows(first, low, stop, n_rings, column, cosine, factor, rows):
         part[1, count - 1] = even.imag
         part[2, count - 1] = odd.real
         part[3, count - 1] = odd.imag
-    part[:, count:] = 0.0
+    part[:, count : stop - low] = 0.0
 
 
 @inner
@@ -357,11 +359,12 @@ def _add_orders(
     first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    (recursion, powers, starts), (mixers, factors, series), quartets, flat, blocks, sums = room
+    (recursion, powers, starts), (mixers, factors, series), quartets, block, blocks, sums = room
     places, rows, work, values = quartets
     g, masked = blocks[0], blocks[1]
     before, now, scale, x = _rows_of(work)
     padded, n_m = rings[0].size, columns.shape[1]
+    n_rings = padded - RINGS
     for m in range(first_m, stop_m):
         low, high = windows[0, m], windows[1, m]
         is_new = m == first_m or m % M_CHUNK == 0
@@ -387,17 +390,17 @@ def _add_orders(
         for q in range(used):
             sums[q, : 4 * WIDTH * (count + PADDING)] = 0.0
             column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
-            if high > low:
-                _load_rows(
-                    first_ring, low, stop, padded - RINGS, column, rings[5], rings[6], rows[q]
-                )
+            if used > 1 and high > low:
+                part = rows[q][:, low:]
+                _load_rows(first_ring, low, stop, n_rings, column, rings[5], rings[6], part)
         used_places = places[:used]
         for start in range(low, high, RINGS):
             is_polar = _load_argument(rings, start, x)
             shift = recursion[2] if is_polar else recursion[1]
             reached = load_start(starts, start, norm, before, now, scale)
             if used == 1:
-                copy_rows(flat, 4, start, used_places, padded, g)
+                last, column = start + RINGS, columns[0, m]
+                _load_rows(first_ring, start, last, n_rings, column, rings[5], rings[6], block)
                 add_block_to_degrees(
                     0,
                     0,
@@ -446,13 +449,13 @@ def add_mirrored_to_harmonics(
 
     Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
     """
-    quartets = _quartets(sides * flm.shape[0], rings[0].size)
+    quartets, blocks = _quartets(sides * flm.shape[0], rings[0].size), np.empty((2, 4 * RINGS))
     room = (
         _workspace(L, n, rings[0].size),
         _series_workspace(L, n),
         quartets,
-        quartets[1].reshape(-1),
-        np.empty((2, 4 * RINGS)),
+        blocks[0].reshape(4, RINGS),
+        blocks,
         np.empty((sides * flm.shape[0], 4 * WIDTH * (L + abs(n) + PADDING))),
     )
     _add_orders(
