@@ -25,8 +25,11 @@ __all__ = ["DISTANCES", "Regions", "Result", "Sums"]
 Array = np.ndarray
 Sums = dict[str, Array]
 
-DISTANCES = (0, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12.5, 15, 20)
-"""Degrees."""
+DISTANCES = (
+    *(0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4),
+    *(5, 6, 7, 8, 9, 10, 12.5, 15, 20),
+)
+"""Degrees; a step matters most near the edge, where most of a small survey lies."""
 
 
 @dataclass(frozen=True, eq=False)

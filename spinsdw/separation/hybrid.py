@@ -37,9 +37,12 @@ __all__ = ["Hybrid", "HybridEstimator", "ScaleRegime"]
 Array = np.ndarray[Any, Any]
 _Parts = tuple[WaveletCoefficients, WaveletCoefficients, WaveletCoefficients | None]
 
-# C^B / C^E of the skies drawn: how much leakage counts against how much loss. The prior of the fit
-# is lower, for there it is E that must win wherever the data leave a choice.
-_B_SHARE = 1e-4
+# Variances of the skies drawn, relative to those of E: how much the loss of B and the noise count
+# against leakage. At most scales E exceeds a B that is worth finding by more than in the fit.
+_B_SHARE = 3e-6
+_NOISE_SHARE = 0.3 * _B_SHARE
+# Width of the taper of the pure estimator where the user says nothing.
+_WIDTH = np.radians(1.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,15 +56,15 @@ class Hybrid:
         None: flat l (l + 1) C_l.
     noise_level : float, optional
         Noise of Q and of U, in the map's unit times radians, where mask and relative inverse noise
-        are 1. None: 2 arcmin times the root of the prior's l (l + 1) C^E_l / 2 pi.
+        are 1. None: 1 arcmin times the root of the prior's l (l + 1) C^E_l / 2 pi.
     b_share : float, default 3e-5
         C^B_l / C^E_l of the flat prior. Larger values keep more of B and leak more of E.
-    max_iterations : int, default 50
+    max_iterations : int, default 100
         The most steps of conjugate gradients.
     tolerance : float, default 1e-4
         The fit stops when its preconditioned gradient has fallen by this factor.
     pure_width : float, optional
-        Width of the taper of the pure estimator in radians; 0 leaves it out. None: 1.5 degrees, or
+        Width of the taper of the pure estimator in radians; 0 leaves it out. None: 1 degree, or
         more where the samples do not resolve that.
     draws : int, default 4
         Skies of each kind that are separated to prepare a mask.
@@ -79,7 +82,7 @@ class Hybrid:
     b_spectrum: Array | None = None
     noise_level: float | None = None
     b_share: float = 3e-5
-    max_iterations: int = 50
+    max_iterations: int = 100
     tolerance: float = 1e-4
     pure_width: float | None = None
     draws: int = 4
@@ -91,7 +94,7 @@ class Hybrid:
         check_integer(self.seed, "seed", minimum=0, remedy="0 is the default")
         width = self.pure_width
         if width is not None and not (math.isfinite(width) and width >= 0):
-            msg = f"pure_width={width} must be finite and at least 0; np.radians(1.5) is usual."
+            msg = f"pure_width={width} must be finite and at least 0; np.radians(1) is usual."
             raise ParameterError(msg)
 
     @functools.cached_property
@@ -178,7 +181,7 @@ class HybridEstimator:
         masks = SmoothMasks(self.survey.sky, self.survey.footprint)
         if masks.widest < masks.narrowest:
             return None
-        width = np.radians(1.5) if wanted is None else wanted
+        width = _WIDTH if wanted is None else wanted
         return masks.of_width(max(width, 1.3 * masks.narrowest) if wanted is None else width)
 
     @functools.cached_property
@@ -206,7 +209,7 @@ class HybridEstimator:
         prior, choices = self.fit.prior(), self.fit.choices
         if choices.e_spectrum is not None:
             return prior
-        return EBPrior(prior.e_spectrum, max(choices.b_share, _B_SHARE) * prior.e_spectrum)
+        return EBPrior(prior.e_spectrum, _B_SHARE * prior.e_spectrum)
 
     @functools.cached_property
     def weights(self) -> dict[int | str, Array]:
@@ -288,9 +291,9 @@ def _regime(bins: ShareBins, found: _Candidates, truth: Array) -> ScaleRegime:
     e, b, noise = np.split(np.arange(len(truth)), 3)
     everywhere = np.ones(bins.share.shape, dtype=bool)
     power, noisy = (bins.mean(truth[kind] ** 2, everywhere) for kind in (b, noise))
-    # Noise counts as much as B at every scale; to pass it as it is on the full sky costs nothing.
+    # Noise counts against B alike at every scale; to pass it as on the full sky costs nothing.
     factors = np.ones(len(truth))
-    factors[noise] = np.sqrt(power / noisy) if noisy > 0 else 0.0
+    factors[noise] = np.sqrt(_NOISE_SHARE / _B_SHARE * power / noisy) if noisy > 0 else 0.0
     columns = [found.residual] if found.pure is None else [found.residual, found.pure - found.fit]
     target = truth.copy()
     target[e] = 0.0

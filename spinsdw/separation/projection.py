@@ -34,7 +34,7 @@ class Projection:
         flat l (l + 1) C_l, which loses nothing against the true one.
     noise_level : float, optional
         Noise of Q and of U, in the map's unit times radians, where mask and relative inverse noise
-        are 1. None: 2 arcmin times the root of the prior's l (l + 1) C_l / 2 pi.
+        are 1. None: 1 arcmin times the root of the prior's l (l + 1) C_l / 2 pi.
     max_iterations : int, default 25
         The most steps of conjugate gradients.
     tolerance : float, default 1e-4

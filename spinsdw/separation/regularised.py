@@ -26,8 +26,8 @@ __all__ = ["FitChoices", "RegularisedFit", "flat_spectrum", "separate_whole"]
 
 Array = np.ndarray[Any, Any]
 
-# n / sqrt(D^E) in radians where the user says nothing: 2 uK arcmin for a D^E of 1 uK^2.
-_NOISE_SHARE = 2 * math.pi / 10800
+# n / sqrt(D^E) in radians where the user says nothing: 1 uK arcmin for a D^E of 1 uK^2.
+_NOISE_SHARE = math.pi / 10800
 
 
 def flat_spectrum(survey: Survey) -> Array:
@@ -58,7 +58,7 @@ class FitChoices:
         C_l of the sky without beam, the square of the map's unit; both or none.
     noise_level : float, optional
         Noise of Q and of U, in the map's unit times radians, where mask and relative inverse noise
-        are 1. None: 2 arcmin times the root of the flat prior's l (l + 1) C_l / 2 pi.
+        are 1. None: 1 arcmin times the root of the flat prior's l (l + 1) C_l / 2 pi.
     b_share : float
         C^B_l / C^E_l of the flat prior.
     max_iterations : int
@@ -76,11 +76,11 @@ class FitChoices:
     b_spectrum: Array | None = None
     noise_level: float | None = None
     b_share: float = 0.0
-    max_iterations: int = 50
+    max_iterations: int = 100
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
-        check_integer(self.max_iterations, "max_iterations", minimum=1, remedy="50 is usual")
+        check_integer(self.max_iterations, "max_iterations", minimum=1, remedy="100 is usual")
         if not 0 <= self.tolerance < 1:
             msg = f"tolerance={self.tolerance} must be in [0, 1); 1e-4 is usual."
             raise ParameterError(msg)

@@ -33,7 +33,7 @@ class Wiener:
     ----------
     noise_level : float, optional
         Noise of Q and of U, in the map's unit times radians, where mask and relative inverse noise
-        are 1; 2 uK arcmin are ``2 * np.pi / 10800``. None, without spectra: 2 arcmin times the root
+        are 1; 2 uK arcmin are ``2 * np.pi / 10800``. None, without spectra: 1 arcmin times the root
         of the l (l + 1) C_l / 2 pi of a flat spectrum with the power of the maps.
     e_spectrum, b_spectrum : ndarray, shape (at least bandlimit,), optional
         C_l of the sky without beam, the square of the map's unit; both or none. None: the band
