@@ -11,7 +11,8 @@ of freedom of E and B: p is split by :math:`\bar p_{lm} = (-1)^m p^*_{l,-m}`, E 
 
 In x = C^{-1/2} p the normal equations are (1 + S Y^H W Y S / n^2) x = S Y^H W P / n^2 with
 S = C^{1/2}; they are solved by preconditioned conjugate gradients that carry the residual in the
-map (CGLS), so that the condition number enters once instead of squared.  The preconditioner is the
+map (CGLS), so that the condition number enters once instead of squared.  A step lowers the sum by
+its length times the power of the gradient.  The preconditioner is the
 inverse for uniform weights, 1 / (1 + C <W> / n^2).
 """
 
@@ -21,12 +22,14 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
-from spinsdw.harmonics import check_integer, conjugate_field
+from spinsdw.harmonics import check_integer
+from spinsdw.parallel import resolve_threads, run_tasks, threads_for
 from spinsdw.separation.skies import Sky
 
 __all__ = ["Convergence", "EBPrior", "LeastSquares", "Observation"]
@@ -35,6 +38,8 @@ Array = np.ndarray[Any, Any]
 
 # Maps fitted in step: more share little further work, and their arrays leave the caches.
 _STACK = 4
+# Samples or coefficients that one task takes of every map.
+_RANGE = 2**15
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,25 +70,39 @@ class Convergence:
 
 
 @dataclass(frozen=True, eq=False)
-class _SplitFilter:
-    """Multiply E and B by real factors of degree, acting on p = -(E + iB)."""
+class SplitFilter:
+    """Multiply E and B by real factors of degree, acting on p = -(E + iB).
+
+    Parameters
+    ----------
+    e_factors, b_factors : ndarray, shape (bandlimit,), float64
+        The factors.
+    threads : int, default 1
+        Threads to use.
+    """
 
     e_factors: Array
     b_factors: Array
+    threads: int = 1
 
     @functools.cached_property
-    def _terms(self) -> tuple[Array, Array | None]:
-        counts = 2 * np.arange(self.e_factors.size) + 1
-        own = np.repeat((self.e_factors + self.b_factors) / 2, counts)
-        mirrored = np.repeat((self.e_factors - self.b_factors) / 2, counts)
-        return own, mirrored if mirrored.any() else None
+    def _factors(self) -> tuple[Array, Array]:
+        return (self.e_factors + self.b_factors) / 2, (self.e_factors - self.b_factors) / 2
 
     def __call__(self, plm: Array) -> Array:
-        own, mirrored = self._terms
-        result: Array = own * plm
-        if mirrored is not None:
-            result += mirrored * conjugate_field(plm)
-        return result
+        """Return the product for coefficients, shape (..., L^2), complex128."""
+        from spinsdw.compiled.fit_updates import split_degrees
+
+        found = np.empty_like(plm)
+        stacks = [one.reshape(-1, plm.shape[-1]) for one in (plm, found)]
+        bandlimit = self.e_factors.size
+        # Equal numbers of coefficients for each thread.
+        ends = np.sqrt(np.arange(1, self.threads + 1) / self.threads) * bandlimit
+        shares = pairwise([0, *np.rint(ends).astype(int)])
+        what = (*self._factors, *stacks)
+        tasks = [functools.partial(split_degrees, *one, *what) for one in shares]
+        run_tasks(tasks, self.threads)
+        return found
 
 
 def _check_spectrum(values: object, name: str) -> Array:
@@ -137,16 +156,14 @@ class EBPrior:
         """L: degrees are l < L."""
         return int(self.e_spectrum.size)
 
-    @functools.cached_property
-    def root(self) -> _SplitFilter:
-        """S = C^(1/2) as an operator on p."""
-        return _SplitFilter(np.sqrt(self.e_spectrum), np.sqrt(self.b_spectrum))
+    def root(self, threads: int = 1) -> SplitFilter:
+        """Return S = C^(1/2) as an operator on p."""
+        return SplitFilter(np.sqrt(self.e_spectrum), np.sqrt(self.b_spectrum), threads)
 
-    def preconditioner(self, precision: float) -> _SplitFilter:
+    def preconditioner(self, precision: float, threads: int = 1) -> SplitFilter:
         """Return 1 / (1 + C precision) as an operator on p."""
-        return _SplitFilter(
-            1 / (1 + precision * self.e_spectrum), 1 / (1 + precision * self.b_spectrum)
-        )
+        e, b = (1 / (1 + precision * one) for one in (self.e_spectrum, self.b_spectrum))
+        return SplitFilter(e, b, threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,13 +206,18 @@ class Observation:
             raise DataError(msg)
 
     @functools.cached_property
+    def densities(self) -> Array:
+        """Inverse noise power of each sample, W dOmega / n^2; shape of a map, float64."""
+        return self.weights * self.sky.areas / self.noise_level**2
+
+    @functools.cached_property
     def _root(self) -> Array:
-        return np.sqrt(self.weights * self.sky.areas) / self.noise_level
+        return np.sqrt(self.densities)
 
     @functools.cached_property
     def precision(self) -> float:
         """Mean over the sphere of the inverse noise power, <W> / n^2."""
-        return float(np.sum(self._root**2) / (4 * math.pi))
+        return float(np.sum(self.densities) / (4 * math.pi))
 
     def weight_harmonics(self, bandlimit: int) -> Array:
         """Return the coefficients of the inverse noise power W / n^2 below a bandlimit, by sums."""
@@ -214,10 +236,55 @@ class Observation:
         return self.sky.adjoint_polarisation_map(self._root * values)
 
 
-def _power(left: Array, right: Array) -> Array:
-    """Re <left, right> of each map of a stack: the inner product of the real degrees of freedom."""
-    products = left.real * right.real + left.imag * right.imag
-    return np.asarray(products.reshape(len(products), -1).sum(axis=1))
+@dataclass(frozen=True, eq=False)
+class _Stacks:
+    """Sums and updates of stacks of samples or coefficients, in ranges shared among threads.
+
+    The ranges are the same for any number of threads, and so are the results.
+    """
+
+    threads: int
+
+    def _ranges(self, size: int) -> list[tuple[int, int]]:
+        return [(first, min(first + _RANGE, size)) for first in range(0, size, _RANGE)]
+
+    def _share(self, call: Callable[..., None], size: int, *what: Array) -> None:
+        ranges = self._ranges(size)
+        run_tasks([functools.partial(call, *one, *what) for one in ranges], self.threads)
+
+    def _sum(self, call: Callable[..., None], left: Array, right: Array) -> Array:
+        ranges = self._ranges(right.shape[1])
+        sums = np.empty((len(ranges), len(right)))
+        tasks = [
+            functools.partial(call, *one, left, right, part)
+            for one, part in zip(ranges, sums, strict=True)
+        ]
+        run_tasks(tasks, self.threads)
+        return np.asarray(sums.sum(axis=0))
+
+    def product(self, left: Array, right: Array) -> Array:
+        """Re <left, right> of each row: the inner product of the real degrees of freedom."""
+        from spinsdw.compiled.fit_updates import sum_products
+
+        return self._sum(sum_products, left, right)
+
+    def weighted_power(self, weights: Array, values: Array) -> Array:
+        """Return the sums of weights |values|^2 of each row."""
+        from spinsdw.compiled.fit_updates import sum_weighted
+
+        return self._sum(sum_weighted, weights, values)
+
+    def subtract(self, factors: Array, weights: Array, values: Array, out: Array) -> None:
+        """Subtract factors times weights times values."""
+        from spinsdw.compiled.fit_updates import subtract_weighted
+
+        self._share(subtract_weighted, out.shape[1], factors, weights, values, out)
+
+    def add(self, scales: Array, factors: Array, values: Array, out: Array) -> None:
+        """Put scales times ``out`` plus factors times values in ``out``."""
+        from spinsdw.compiled.fit_updates import add_multiples
+
+        self._share(add_multiples, out.shape[1], scales, factors, values, out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +346,12 @@ class LeastSquares:
     def _preconditioner(self) -> Callable[[Array], Array]:
         if self.preconditioner is not None:
             return self.preconditioner
-        return self.prior.preconditioner(self.observation.precision)
+        return self.prior.preconditioner(self.observation.precision, self._threads)
+
+    @property
+    def _threads(self) -> int:
+        sky = self.observation.sky
+        return threads_for(sky.bandlimit, resolve_threads(sky.threads))
 
     def solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:
         """Return the coefficients p_lm that fit each map of a stack best, and how the fits went.
@@ -296,40 +368,40 @@ class LeastSquares:
         convergence : tuple of Convergence
             Steps, residuals and the sum minimised, for each map.
         """
-        fits = [
-            self.solve_whitened(self.observation.whiten(p[start : start + _STACK]))
-            for start in range(0, len(p), _STACK)
-        ]
+        fits = [self._solve(p[start : start + _STACK]) for start in range(0, len(p), _STACK)]
         plm = np.concatenate([found for found, _ in fits])
         return plm, tuple(history for _, histories in fits for history in histories)
 
-    def solve_whitened(self, values: Array) -> tuple[Array, tuple[Convergence, ...]]:
-        """Fit stacks of values in units of the noise, as `Observation.whiten` makes them."""
-        root, observation = self.prior.root, self.observation
-        remainder = values.astype(np.complex128)
-        gradient = root(observation.adjoint_observe(remainder))
+    def _solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:
+        sky, stacks = self.observation.sky, _Stacks(self._threads)
+        root, weights = self.prior.root(self._threads), self.observation.densities.reshape(-1)
+        rest = (self.observation.densities * p).reshape(len(p), -1).astype(np.complex128)
+        shape, ones = p.shape, np.ones(len(p))
+        gradient = root(sky.adjoint_polarisation_map(rest.reshape(shape)))
         direction = self._preconditioner(gradient)
         x = np.zeros_like(direction)
-        power = start = _power(gradient, direction)
-        powers, objective = [start], [_power(remainder, remainder)]
+        power = start = stacks.product(gradient, direction)
+        observed = np.where(self.observation.weights > 0, p, 0).reshape(len(p), -1)
+        powers, objective = [start], [stacks.weighted_power(weights, observed)]
         while len(powers) <= self.max_iterations:
             # A map that has converged stands still: its result does not depend on the stack.
             active = power > self.tolerance**2 * start
             if not active.any():
                 break
-            change = observation.observe(root(direction))
-            curvature = _power(change, change) + _power(direction, direction)
+            change = sky.polarisation_map(root(direction)).reshape(len(p), -1)
+            curvature = stacks.weighted_power(weights, change) + stacks.product(direction, direction)
             step = np.divide(power, curvature, out=np.zeros_like(power), where=active)
-            x += step[:, None] * direction
-            remainder -= _along(step, change) * change
-            gradient = root(observation.adjoint_observe(remainder)) - x
+            stacks.add(ones, step, direction, x)
+            stacks.subtract(step, weights, change, rest)
+            gradient = root(sky.adjoint_polarisation_map(rest.reshape(shape)))
+            stacks.add(ones, -ones, x, gradient)
             ahead = self._preconditioner(gradient)
-            previous, power = power, np.where(active, _power(gradient, ahead), power)
+            objective.append(objective[-1] - step * power)
+            previous = power
+            power = np.where(active, stacks.product(gradient, ahead), power)
             ratio = np.divide(power, previous, out=np.zeros_like(power), where=previous > 0)
-            direction *= ratio[:, None]
-            direction += ahead
+            stacks.add(ratio, ones, ahead, direction)
             powers.append(power)
-            objective.append(_power(remainder, remainder) + _power(x, x))
         return root(x), self._histories(np.array(powers), np.array(objective))
 
     def _histories(self, powers: Array, objective: Array) -> tuple[Convergence, ...]:
@@ -343,8 +415,3 @@ class LeastSquares:
             converged = bool(residuals[taken] <= self.tolerance)
             found.append(Convergence(taken, residuals[: taken + 1], sums[: taken + 1], converged))
         return tuple(found)
-
-
-def _along(factors: Array, values: Array) -> Array:
-    """Give one factor for each map of a stack the axes of the stack."""
-    return factors.reshape(-1, *(1,) * (values.ndim - 1))

@@ -72,7 +72,7 @@ class LowDegreeBlock:
         from scipy.sparse import csr_array
 
         size, first = self._size, 4
-        root = EBPrior(self.prior.e_spectrum[:size], self.prior.b_spectrum[:size]).root
+        root = EBPrior(self.prior.e_spectrum[:size], self.prior.b_spectrum[:size]).root()
         apply = self._weigher(size)
         ones = np.eye(size**2, dtype=np.complex128)[first:]
         weighed = np.concatenate([apply(ones[i : i + _BATCH]) for i in range(0, len(ones), _BATCH)])

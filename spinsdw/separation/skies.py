@@ -39,6 +39,11 @@ class Sky(Protocol):
         ...
 
     @property
+    def threads(self) -> int | None:
+        """Threads of the transforms; all cores when None."""
+        ...
+
+    @property
     def sampling_name(self) -> str:
         """Kind of grid the wavelet coefficients of this sky live on."""
         ...

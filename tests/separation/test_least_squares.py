@@ -47,7 +47,7 @@ def dense(operator, size):
 
 def dense_fit(observation, prior, p):
     """Solve (1 + S R^T R S) x = S R^T d, p_lm = S x, with R and S written out as matrices."""
-    root, seen = dense(prior.root, L * L), dense(observation.observe, L * L)
+    root, seen = dense(prior.root(), L * L), dense(observation.observe, L * L)
     matrix = np.eye(len(root)) + root.T @ seen.T @ seen @ root
     x = np.linalg.solve(matrix, root.T @ seen.T @ as_real(observation.whiten(p)))
     real, imag = np.split(root @ x, 2)
@@ -92,7 +92,7 @@ def test_fit_is_the_dense_solution(sky, b_share, weights):
 @each_sky
 def test_operators_are_symmetric_in_the_real_inner_product(sky):
     """S^T = S, and the adjoint of an observation is its transpose, over the reals"""
-    root = dense(EBPrior(FALLING, 0.1 * FALLING).root, L * L)
+    root = dense(EBPrior(FALLING, 0.1 * FALLING).root(), L * L)
     assert_close(root, root.T, ulps=1)
     observation = Observation(sky, uneven(sky), NOISE)
     seen = dense(observation.observe, L * L)
@@ -105,7 +105,7 @@ def test_operators_are_symmetric_in_the_real_inner_product(sky):
 def test_root_multiplies_e_and_b_by_their_own_factors(sky):
     """E_lm -> sqrt(C^E_l) E_lm, B_lm -> sqrt(C^B_l) B_lm"""
     e_lm, b_lm = random_real_flm(L, seed=5), random_real_flm(L, seed=6)
-    e_root, b_root = spin_to_eb(EBPrior(FALLING, 4 * FALLING).root(eb_to_spin(e_lm, b_lm)))
+    e_root, b_root = spin_to_eb(EBPrior(FALLING, 4 * FALLING).root()(eb_to_spin(e_lm, b_lm)))
     factors = np.repeat(np.where(np.arange(L) < 2, 0, np.sqrt(FALLING)), 2 * np.arange(L) + 1)
     assert_close(e_root, factors * e_lm, ulps=8)
     assert_close(b_root, 2 * factors * b_lm, ulps=8)
