@@ -173,7 +173,7 @@ def test_full_sky_fit_takes_few_steps(sky):
 @each_sky
 def test_stack_is_fitted_map_by_map(sky):
     """A map's fit is its own, whatever the others are; one that needs no step waits for them"""
-    solver = LeastSquares(Observation(sky, cap(sky), NOISE), EBPrior(FALLING, FALLING), 40, 1e-6)
+    solver = LeastSquares(Observation(sky, cap(sky), NOISE), EBPrior(FALLING, FALLING), 400, 1e-12)
     easy = sky.polarisation_map(eb_to_spin(random_real_flm(L), 0 * random_real_flm(L)))
     maps = np.array([random_p(sky, 1)[0], 0 * easy, easy, random_p(sky, 2)[0]])
     plm, histories = solver.solve(maps)
@@ -181,10 +181,9 @@ def test_stack_is_fitted_map_by_map(sky):
     assert [history.iterations == 0 for history in histories] == [False, True, False, False]
     for p, row, history in zip(maps, plm, histories, strict=True):
         (alone,), (report,) = solver.solve(p[None])
-        # Rounding differs between stacks; a step more or less leaves the tolerance times the
-        # condition of the fit.
-        assert np.max(np.abs(row - alone)) <= 1e-3 * np.max(np.abs(alone))
-        assert abs(history.iterations - report.iterations) <= 3
+        # Rounding differs between stacks: a fit may take a step more or less than alone.
+        assert np.max(np.abs(row - alone)) <= 1e-9 * np.max(np.abs(alone))
+        assert abs(history.iterations - report.iterations) <= 5
 
 
 @each_sky
