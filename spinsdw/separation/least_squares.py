@@ -22,15 +22,15 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
 from spinsdw.harmonics import check_integer
-from spinsdw.parallel import resolve_threads, run_tasks, threads_for
+from spinsdw.parallel import resolve_threads, threads_for
 from spinsdw.separation.skies import Sky
+from spinsdw.separation.stacks import SplitFilter, Stacks
 
 __all__ = ["Convergence", "EBPrior", "LeastSquares", "Observation"]
 
@@ -38,8 +38,6 @@ Array = np.ndarray[Any, Any]
 
 # Maps fitted in step: more share little further work, and their arrays leave the caches.
 _STACK = 4
-# Samples or coefficients that one task takes of every map.
-_RANGE = 2**15
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,42 +65,6 @@ class Convergence:
     def residual(self) -> float:
         """The last residual."""
         return float(self.residuals[-1])
-
-
-@dataclass(frozen=True, eq=False)
-class SplitFilter:
-    """Multiply E and B by real factors of degree, acting on p = -(E + iB).
-
-    Parameters
-    ----------
-    e_factors, b_factors : ndarray, shape (bandlimit,), float64
-        The factors.
-    threads : int, default 1
-        Threads to use.
-    """
-
-    e_factors: Array
-    b_factors: Array
-    threads: int = 1
-
-    @functools.cached_property
-    def _factors(self) -> tuple[Array, Array]:
-        return (self.e_factors + self.b_factors) / 2, (self.e_factors - self.b_factors) / 2
-
-    def __call__(self, plm: Array) -> Array:
-        """Return the product for coefficients, shape (..., L^2), complex128."""
-        from spinsdw.compiled.fit_updates import split_degrees
-
-        found = np.empty_like(plm)
-        stacks = [one.reshape(-1, plm.shape[-1]) for one in (plm, found)]
-        bandlimit = self.e_factors.size
-        # Equal numbers of coefficients for each thread.
-        ends = np.sqrt(np.arange(1, self.threads + 1) / self.threads) * bandlimit
-        shares = pairwise([0, *np.rint(ends).astype(int)])
-        what = (*self._factors, *stacks)
-        tasks = [functools.partial(split_degrees, *one, *what) for one in shares]
-        run_tasks(tasks, self.threads)
-        return found
 
 
 def _check_spectrum(values: object, name: str) -> Array:
@@ -208,7 +170,7 @@ class Observation:
     @functools.cached_property
     def densities(self) -> Array:
         """Inverse noise power of each sample, W dOmega / n^2; shape of a map, float64."""
-        return self.weights * self.sky.areas / self.noise_level**2
+        return np.ascontiguousarray(self.weights * self.sky.areas / self.noise_level**2)
 
     @functools.cached_property
     def _root(self) -> Array:
@@ -236,55 +198,14 @@ class Observation:
         return self.sky.adjoint_polarisation_map(self._root * values)
 
 
-@dataclass(frozen=True, eq=False)
-class _Stacks:
-    """Sums and updates of stacks of samples or coefficients, in ranges shared among threads.
+@dataclass(eq=False)
+class _State:
+    """Where the fits of a stack are: the weighted remainder, x, and where it goes next."""
 
-    The ranges are the same for any number of threads, and so are the results.
-    """
-
-    threads: int
-
-    def _ranges(self, size: int) -> list[tuple[int, int]]:
-        return [(first, min(first + _RANGE, size)) for first in range(0, size, _RANGE)]
-
-    def _share(self, call: Callable[..., None], size: int, *what: Array) -> None:
-        ranges = self._ranges(size)
-        run_tasks([functools.partial(call, *one, *what) for one in ranges], self.threads)
-
-    def _sum(self, call: Callable[..., None], left: Array, right: Array) -> Array:
-        ranges = self._ranges(right.shape[1])
-        sums = np.empty((len(ranges), len(right)))
-        tasks = [
-            functools.partial(call, *one, left, right, part)
-            for one, part in zip(ranges, sums, strict=True)
-        ]
-        run_tasks(tasks, self.threads)
-        return np.asarray(sums.sum(axis=0))
-
-    def product(self, left: Array, right: Array) -> Array:
-        """Re <left, right> of each row: the inner product of the real degrees of freedom."""
-        from spinsdw.compiled.fit_updates import sum_products
-
-        return self._sum(sum_products, left, right)
-
-    def weighted_power(self, weights: Array, values: Array) -> Array:
-        """Return the sums of weights |values|^2 of each row."""
-        from spinsdw.compiled.fit_updates import sum_weighted
-
-        return self._sum(sum_weighted, weights, values)
-
-    def subtract(self, factors: Array, weights: Array, values: Array, out: Array) -> None:
-        """Subtract factors times weights times values."""
-        from spinsdw.compiled.fit_updates import subtract_weighted
-
-        self._share(subtract_weighted, out.shape[1], factors, weights, values, out)
-
-    def add(self, scales: Array, factors: Array, values: Array, out: Array) -> None:
-        """Put scales times ``out`` plus factors times values in ``out``."""
-        from spinsdw.compiled.fit_updates import add_multiples
-
-        self._share(add_multiples, out.shape[1], scales, factors, values, out)
+    rest: Array
+    x: Array
+    direction: Array
+    power: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,6 +274,18 @@ class LeastSquares:
         sky = self.observation.sky
         return threads_for(sky.bandlimit, resolve_threads(sky.threads))
 
+    @functools.cached_property
+    def _root(self) -> SplitFilter:
+        return self.prior.root(self._threads)
+
+    @functools.cached_property
+    def _stacks(self) -> Stacks:
+        return Stacks(self._threads)
+
+    @property
+    def _densities(self) -> Array:
+        return self.observation.densities.reshape(-1)
+
     def solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:
         """Return the coefficients p_lm that fit each map of a stack best, and how the fits went.
 
@@ -373,36 +306,49 @@ class LeastSquares:
         return plm, tuple(history for _, histories in fits for history in histories)
 
     def _solve(self, p: Array) -> tuple[Array, tuple[Convergence, ...]]:
-        sky, stacks = self.observation.sky, _Stacks(self._threads)
-        root, weights = self.prior.root(self._threads), self.observation.densities.reshape(-1)
-        rest = (self.observation.densities * p).reshape(len(p), -1).astype(np.complex128)
-        shape, ones = p.shape, np.ones(len(p))
-        gradient = root(sky.adjoint_polarisation_map(rest.reshape(shape)))
-        direction = self._preconditioner(gradient)
-        x = np.zeros_like(direction)
-        power = start = stacks.product(gradient, direction)
-        observed = np.where(self.observation.weights > 0, p, 0).reshape(len(p), -1)
-        powers, objective = [start], [stacks.weighted_power(weights, observed)]
+        state = self._start(p)
+        powers, objective = [state.power], [self._power_seen(p)]
         while len(powers) <= self.max_iterations:
             # A map that has converged stands still: its result does not depend on the stack.
-            active = power > self.tolerance**2 * start
+            active = state.power > self.tolerance**2 * powers[0]
             if not active.any():
                 break
-            change = sky.polarisation_map(root(direction)).reshape(len(p), -1)
-            curvature = stacks.weighted_power(weights, change) + stacks.product(direction, direction)
-            step = np.divide(power, curvature, out=np.zeros_like(power), where=active)
-            stacks.add(ones, step, direction, x)
-            stacks.subtract(step, weights, change, rest)
-            gradient = root(sky.adjoint_polarisation_map(rest.reshape(shape)))
-            stacks.add(ones, -ones, x, gradient)
-            ahead = self._preconditioner(gradient)
-            objective.append(objective[-1] - step * power)
-            previous = power
-            power = np.where(active, stacks.product(gradient, ahead), power)
-            ratio = np.divide(power, previous, out=np.zeros_like(power), where=previous > 0)
-            stacks.add(ratio, ones, ahead, direction)
-            powers.append(power)
-        return root(x), self._histories(np.array(powers), np.array(objective))
+            step = self._advance(state, active)
+            objective.append(objective[-1] - step * powers[-1])
+            powers.append(state.power)
+        found = self._root(state.x)
+        return found, self._histories(np.array(powers), np.array(objective))
+
+    def _power_seen(self, p: Array) -> Array:
+        """Return the sum that is minimised where the fit is zero."""
+        seen = np.where(self.observation.weights > 0, p, 0).reshape(len(p), -1)
+        return self._stacks.weighted_power(self._densities, seen)
+
+    def _start(self, p: Array) -> _State:
+        rest = np.asarray(self.observation.densities * p, dtype=np.complex128)
+        gradient = self._root(self.observation.sky.adjoint_polarisation_map(rest))
+        direction = self._preconditioner(gradient)
+        power = self._stacks.product(gradient, direction)
+        return _State(rest, np.zeros_like(direction), direction, power)
+
+    def _advance(self, state: _State, active: Array) -> Array:
+        """Take one step for the active maps of a stack; return its length."""
+        sky, stacks, size = self.observation.sky, self._stacks, len(state.rest)
+        ones = np.ones(size)
+        change = sky.polarisation_map(self._root(state.direction)).reshape(size, -1)
+        curvature = stacks.weighted_power(self._densities, change)
+        curvature += stacks.product(state.direction, state.direction)
+        step = np.divide(state.power, curvature, out=np.zeros(size), where=active)
+        stacks.add(ones, step, state.direction, state.x)
+        stacks.subtract(step, self._densities, change, state.rest.reshape(size, -1))
+        gradient = self._root(sky.adjoint_polarisation_map(state.rest))
+        stacks.add(ones, -ones, state.x, gradient)
+        ahead = self._preconditioner(gradient)
+        power = np.where(active, stacks.product(gradient, ahead), state.power)
+        ratio = np.divide(power, state.power, out=np.zeros(size), where=state.power > 0)
+        stacks.add(ratio, ones, ahead, state.direction)
+        state.power = power
+        return np.asarray(step)
 
     def _histories(self, powers: Array, objective: Array) -> tuple[Convergence, ...]:
         """Tell how each map's fit went: columns of both arrays, one row a step."""
