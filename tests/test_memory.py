@@ -166,7 +166,7 @@ def test_a_process_grows_by_the_estimate_and_less_than_half_beyond_the_data(
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
     # Once for the machine code alone: a compiler's memory would count as the transform's.
-    run(8)
+    run(256)
     found = run(bandlimit)
     assert found["growth"] < 1.5 * (found["input"] + found["output"])
     assert found["growth"] == pytest.approx(found["estimate"], rel=0.05)
