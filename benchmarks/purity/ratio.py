@@ -77,8 +77,8 @@ class RatioTest:
 
     @property
     def shift_error(self) -> float:
-        """Standard error of the shift."""
-        return float(np.std(self.found - self.true, ddof=1) / np.sqrt(self.found.size))
+        """Standard error of the shift: of the mean over the skies, and of m from as many others."""
+        return float(np.std(self.found - self.true, ddof=1) * np.sqrt(2 / self.found.size))
 
     @property
     def sigma(self) -> float:
