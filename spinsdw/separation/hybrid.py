@@ -25,7 +25,7 @@ from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.errors import ParameterError
 from spinsdw.harmonics import check_integer, eb_to_spin, spin_to_eb
 from spinsdw.separation.ensemble import ShareBins, draw_fields, draw_white, position_areas
-from spinsdw.separation.least_squares import Convergence, EBPrior
+from spinsdw.separation.least_squares import STACK, Convergence, EBPrior, LeastSquares
 from spinsdw.separation.method import Estimate
 from spinsdw.separation.pure_harmonics import pure_harmonics
 from spinsdw.separation.regularised import FitChoices, RegularisedFit, separate_whole
@@ -192,7 +192,7 @@ class HybridEstimator:
         noise = draw_white(survey, method.draws, method.seed)
         p = survey.observed * survey.sky.polarisation_map(np.concatenate([drawn, noise]))
         p[len(drawn) :] /= np.sqrt(np.where(survey.weights > 0, survey.weights, 1.0))
-        parts, _ = self._parts(self._drawn_fit, p, with_pure=True)
+        parts, _ = self._parts(self._drawn_fit.solver_for(p), p, with_pure=True)
         truth = survey.transform.analysis_harmonic(np.concatenate([drawn, noise]))
         return {
             key: _regime(
@@ -228,12 +228,12 @@ class HybridEstimator:
         return replace(self.fit, choices=replace(choices, noise_level=None))
 
     def _parts(
-        self, fit: RegularisedFit, p: Array, *, with_pure: bool
+        self, solver: LeastSquares, p: Array, *, with_pure: bool
     ) -> tuple[_Parts, tuple[Convergence, ...]]:
         """Return the coefficients of fit, residual and pure residual, and how the fit went."""
         survey, analysis = self.survey, self.survey.transform.analysis_harmonic
-        plm, convergence = fit.fit(p)
-        left = fit.residual(p, plm)
+        plm, convergence = solver.solve(p)
+        left = self.fit.residual(p, plm)
         pure = None
         if with_pure and self._smooth_mask is not None:
             e_lm, _ = spin_to_eb(plm)
@@ -246,8 +246,25 @@ class HybridEstimator:
         """Separate maps, shape (batch, *map)."""
         if self.survey.mask is None:
             return separate_whole(self.survey, p)
+        # As many maps at a time as are fitted in step: more leave the caches in every step.
+        stacks = [slice(start, start + STACK) for start in range(0, len(p), STACK)]
+        solver = self.fit.solver_for(p)
+        found = [self._estimate(solver, p[one]) for one in stacks]
+        values = {
+            key: np.concatenate([_part(estimate.coefficients, key) for estimate in found])
+            for key in self.survey.shares
+        }
+        scaling = values.pop("scaling")
+        scales = {int(key): part for key, part in values.items()}
+        coefficients = WaveletCoefficients(scaling, scales, found[0].coefficients.parameters)
+        return Estimate(
+            coefficients,
+            convergence=tuple(one for estimate in found for one in estimate.convergence),
+        )
+
+    def _estimate(self, solver: LeastSquares, p: Array) -> Estimate:
         with_pure = any(regime.pure.any() for regime in self.regimes.values())
-        (fitted, left, pure), convergence = self._parts(self.fit, p, with_pure=with_pure)
+        (fitted, left, pure), convergence = self._parts(solver, p, with_pure=with_pure)
         # E leaks nothing that matters into itself: all of its residual is kept.
         found = (fitted + left).map(np.real)
         b_parts = {}

@@ -32,12 +32,12 @@ from spinsdw.parallel import resolve_threads, threads_for
 from spinsdw.separation.skies import Sky
 from spinsdw.separation.stacks import SplitFilter, Stacks
 
-__all__ = ["Convergence", "EBPrior", "LeastSquares", "Observation"]
+__all__ = ["STACK", "Convergence", "EBPrior", "LeastSquares", "Observation"]
 
 Array = np.ndarray[Any, Any]
 
 # Maps fitted in step: more share little further work, and their arrays leave the caches.
-_STACK = 4
+STACK = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +301,7 @@ class LeastSquares:
         convergence : tuple of Convergence
             Steps, residuals and the sum minimised, for each map.
         """
-        fits = [self._solve(p[start : start + _STACK]) for start in range(0, len(p), _STACK)]
+        fits = [self._solve(p[start : start + STACK]) for start in range(0, len(p), STACK)]
         plm = np.concatenate([found for found, _ in fits])
         return plm, tuple(history for _, histories in fits for history in histories)
 
