@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ NSIDE = 4
 SAMPLING_NAMES = ("mw", "mwss", "gl")
 # One direction, an even and an odd number of them: their orders run through different branches.
 DIRECTIONS = (1, 2, 3)
+# Circles of the first are transformed as they are, those of the second are padded before.
+CIRCLES = (BANDLIMIT, 21)
 
 
 def warm_up(threads: int | None = None) -> dict[str, float]:
@@ -115,7 +118,7 @@ def _wavelet_transforms(threads: int | None) -> None:
 
 
 def _run_wavelets(transform: SpinWaveletTransform) -> None:
-    maps = transform.harmonic.synthesis(np.zeros(BANDLIMIT**2, dtype=np.complex128))
+    maps = transform.harmonic.synthesis(np.zeros(transform.bandlimit**2, dtype=np.complex128))
     coefficients = transform.analysis(maps)
     transform.synthesis(coefficients)
     transform.adjoint_analysis(coefficients)
@@ -123,10 +126,10 @@ def _run_wavelets(transform: SpinWaveletTransform) -> None:
 
 
 def _single_precision(threads: int | None) -> None:
-    for sampling in SAMPLING_NAMES:
+    for sampling, bandlimit in product(SAMPLING_NAMES, CIRCLES):
         for real in (False, True):
             transform = SpinWaveletTransform(
-                BANDLIMIT,
+                bandlimit,
                 0,
                 directions=2,
                 sampling=sampling,
