@@ -37,10 +37,11 @@ __all__ = ["Hybrid", "HybridEstimator", "ScaleRegime"]
 Array = np.ndarray[Any, Any]
 _Parts = tuple[WaveletCoefficients, WaveletCoefficients, WaveletCoefficients | None]
 
-# Variances of the skies drawn, relative to those of E: how much the loss of B and the noise count
-# against leakage. At most scales E exceeds a B that is worth finding by more than in the fit.
+# C^B / C^E of the skies drawn: how much the loss of B counts against leakage. It is below that of
+# the fit, which loses more of B the lower its prior is.
 _B_SHARE = 3e-6
-_NOISE_SHARE = 0.3 * _B_SHARE
+# Power of the noise drawn over that of B, at each scale: how much its growth counts.
+_NOISE_RATIO = 0.3
 # Width of the taper of the pure estimator where the user says nothing.
 _WIDTH = np.radians(1.0)
 
@@ -310,7 +311,7 @@ def _regime(bins: ShareBins, found: _Candidates, truth: Array) -> ScaleRegime:
     power, noisy = (bins.mean(truth[kind] ** 2, everywhere) for kind in (b, noise))
     # Noise counts against B alike at every scale; to pass it as on the full sky costs nothing.
     factors = np.ones(len(truth))
-    factors[noise] = np.sqrt(_NOISE_SHARE / _B_SHARE * power / noisy) if noisy > 0 else 0.0
+    factors[noise] = np.sqrt(_NOISE_RATIO * power / noisy) if noisy > 0 else 0.0
     columns = [found.residual] if found.pure is None else [found.residual, found.pure - found.fit]
     target = truth.copy()
     target[e] = 0.0

@@ -51,7 +51,8 @@ class Convergence:
     residuals : ndarray, shape (iterations + 1,), float64
         Norm of the preconditioned gradient after each step, relative to its start.
     objective : ndarray, shape (iterations + 1,), float64
-        The sum that is minimised, after each step; it never rises.
+        The sum that is minimised, after each step: the first from the map, the others by what a
+        step of conjugate gradients takes off. It never rises.
     converged : bool
         Whether the last residual is at most the tolerance.
     """
@@ -320,9 +321,9 @@ class LeastSquares:
         return found, self._histories(np.array(powers), np.array(objective))
 
     def _power_seen(self, p: Array) -> Array:
-        """Return the sum that is minimised where the fit is zero."""
-        seen = np.where(self.observation.weights > 0, p, 0).reshape(len(p), -1)
-        return self._stacks.weighted_power(self._densities, seen)
+        """Return the sum that is minimised for a fit of zero."""
+        maps = np.ascontiguousarray(p, dtype=np.complex128).reshape(len(p), -1)
+        return self._stacks.weighted_power(self._densities, maps)
 
     def _start(self, p: Array) -> _State:
         rest = np.asarray(self.observation.densities * p, dtype=np.complex128)
