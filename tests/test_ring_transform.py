@@ -112,9 +112,9 @@ def test_leading_axes_are_a_batch(batch, real):
     assert maps.shape == (*batch, 48)
     assert back.shape == (*batch, 25)
     for place in np.ndindex(*batch):
-        # Fourier transforms of several lines at once round in another order.
         assert np.array_equal(maps[place], transform.synthesis(flm[place]))
-        assert np.array_equal(back[place], transform.adjoint_synthesis(maps[place]))
+        # Sums over rings are in another order for one series than for more.
+        assert_close(back[place], transform.adjoint_synthesis(maps[place]), ulps=16)
 
 
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])

@@ -246,7 +246,7 @@ def test_energy_is_the_sum_of_squared_coefficients(spin, sampling):
 @pytest.mark.parametrize("real", [False, True])
 @pytest.mark.parametrize("batch", [(3,), (2, 3), (1,), (0,), (2, 0)])
 def test_leading_axes_are_a_batch(batch, real):
-    """Every signal of a batch gets the bits it gets alone."""
+    """Every signal of a batch gets what it gets alone: the same bits, or sums in another order."""
     spin = 0 if real else 2
     transform = SpinHarmonicTransform(9, spin, real=real)
     flm = random_real_flm(9, batch=batch) if real else random_flm(9, 2, batch=batch)
@@ -257,7 +257,8 @@ def test_leading_axes_are_a_batch(batch, real):
         found = getattr(transform, name)(source)
         assert found.shape[: len(batch)] == batch
         for place in np.ndindex(*batch):
-            assert np.array_equal(found[place], getattr(transform, name)(source[place]))
+            ulps = 0 if name == "synthesis" else 16
+            assert_close(found[place], getattr(transform, name)(source[place]), ulps=ulps)
     assert transform.adjoint_analysis(flm).shape == maps.shape
 
 

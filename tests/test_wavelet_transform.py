@@ -628,7 +628,8 @@ def test_leading_axes_are_a_batch(batch, real):
         for key, values in items(alone):
             stored = coefficients.scaling if key == "scaling" else coefficients[key]
             assert np.array_equal(stored[place], values)
-        assert np.array_equal(back[place], transform.synthesis_harmonic(alone))
+        # Sums over rings are in another order for one map than for more.
+        assert_close(back[place], transform.synthesis_harmonic(alone), ulps=16)
 
 
 @pytest.mark.parametrize(("spin", "real"), [(0, True), (2, False)])

@@ -28,10 +28,11 @@ from spinsdw.compiled.ring_sums import (
     CHUNK,
     add_block_to_degrees,
     add_quartets_to_degrees,
+    add_up_lanes,
     sum_block,
     sum_quartets,
 )
-from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
+from spinsdw.compiled.vectors import RINGS, WIDTH
 from spinsdw.compiled.wigner_recursion import PADDING, load_start, prepare_start
 
 __all__ = ["add_mirrored_to_harmonics", "fill_mirrored_columns"]
@@ -323,16 +324,16 @@ def _load_rows(first, low, stop, n_rings, column, cosine, factor, part):
 
 @inner
 def _collect(m, count, sums, mixers, series):
-    """Fill sum_ring d^l_m0 g, m <= l < m + 2 count, from the lanes of the sums of u_k g."""
+    """Fill sum_ring d^l_m0 g, m <= l < m + 2 count, from the sums of u_k g."""
     here, above, odd = mixers[0], mixers[1], mixers[2]
     for part in range(2):
         out = series[part, m:]
         before = 0.0
         for k in range(count):
-            place = (4 * k + part) * WIDTH
-            even = sum_lanes(sums, place)
+            place = 4 * k + part
+            even = sums[place]
             out[2 * k] = here[k] * even + before
-            out[2 * k + 1] = odd[k] * sum_lanes(sums, place + 2 * WIDTH)
+            out[2 * k + 1] = odd[k] * sums[place + 2]
             before = above[k] * even
 
 
@@ -359,8 +360,9 @@ def _add_orders(
     first_m, stop_m, L, sides, n, first_ring, columns, weights, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    (recursion, powers, starts), (mixers, factors, series), quartets, block, blocks, sums = room
+    (recursion, powers, starts), (mixers, factors, series), quartets, block, blocks, found = room
     places, rows, work, values = quartets
+    sums, lanes = found
     g, masked = blocks[0], blocks[1]
     before, now, scale, x = _rows_of(work)
     padded, n_m = rings[0].size, columns.shape[1]
@@ -388,11 +390,13 @@ def _add_orders(
         used = n_sides * flm.shape[0]
         stop = _end_of_blocks(low, high)
         for q in range(used):
-            sums[q, : 4 * WIDTH * (count + PADDING)] = 0.0
+            sums[q, : 4 * (count + PADDING)] = 0.0
             column = columns[q // n_sides, m if q % n_sides == 0 else n_m - m]
             if used > 1 and high > low:
                 part = rows[q][:, low:]
                 _load_rows(first_ring, low, stop, n_rings, column, rings[5], rings[6], part)
+        if used == 1:
+            lanes[: 4 * WIDTH * (count + PADDING)] = 0.0
         used_places = places[:used]
         for start in range(low, high, RINGS):
             is_polar = _load_argument(rings, start, x)
@@ -416,7 +420,7 @@ def _add_orders(
                     before,
                     now,
                     scale,
-                    sums[0],
+                    lanes,
                 )
             else:
                 add_quartets_to_degrees(
@@ -435,6 +439,8 @@ def _add_orders(
                     values,
                     sums,
                 )
+        if used == 1:
+            add_up_lanes(lanes, 0, 4 * count, sums[0])
         for q in range(used):
             _collect(m, count, sums[q], mixers, series[0])
             side = q % n_sides
@@ -450,13 +456,14 @@ def add_mirrored_to_harmonics(
     Shapes as in `fill_mirrored_columns`, whose adjoint this is for conjugated weights.
     """
     quartets, blocks = _quartets(sides * flm.shape[0], rings[0].size), np.empty((2, 4 * RINGS))
+    size = 4 * (L + abs(n) + PADDING)
     room = (
         _workspace(L, n, rings[0].size),
         _series_workspace(L, n),
         quartets,
         blocks[0].reshape(4, RINGS),
         blocks,
-        np.empty((sides * flm.shape[0], 4 * WIDTH * (L + abs(n) + PADDING))),
+        (np.empty((sides * flm.shape[0], size)), np.empty(WIDTH * size)),
     )
     _add_orders(
         first_m,

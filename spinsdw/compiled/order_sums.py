@@ -26,12 +26,13 @@ from spinsdw.compiled.ring_sums import (
     CHUNK,
     add_block_to_degrees,
     add_quartets_to_degrees,
+    add_up_lanes,
     copy_rows,
     copy_sums,
     sum_block,
     sum_quartets,
 )
-from spinsdw.compiled.vectors import RINGS, WIDTH, sum_lanes
+from spinsdw.compiled.vectors import RINGS, WIDTH
 from spinsdw.compiled.wigner_recursion import (
     PADDING,
     fill_recursion,
@@ -392,7 +393,7 @@ def _load_series(run, m, sides, low, high, n_rings, columns, stride, places, row
 
 @inner
 def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm):
-    """f_{l, sigma m} += sign_l scale_l weight_l times the summed lanes of one series."""
+    """f_{l, sigma m} += sign_l scale_l weight_l times the sums of one series."""
     n, i, sigma, mirrored = run[0], run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
     sign, alternates = _series_sign(sigma, mirrored, m, n)
     target = i if flm.shape[0] > 1 else 0
@@ -400,8 +401,8 @@ def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm
         factor = sign * scale[el]
         if alternates and el & 1:
             factor = -factor
-        place = (el * columns_used + k) * WIDTH
-        value = complex(sum_lanes(sums, place), sum_lanes(sums, place + WIDTH))
+        place = el * columns_used + k
+        value = complex(sums[place], sums[place + 1])
         flm[target, el * el + el + sigma * m] += factor * weights[i, el] * value
 
 
@@ -410,7 +411,7 @@ def _add_orders(
     first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
-    recursion, sums, blocks, (powers, starts) = room
+    recursion, (sums, lanes), blocks, (powers, starts) = room
     (before, now, scale, g, masked), work, values, places, rows = blocks
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
@@ -439,8 +440,10 @@ def _add_orders(
             a, exponents = recursion[0], recursion[2]
             active, columns_used = total // columns.shape[0], min(2 * total, 4)
             used = places[: (total + 1) // 2]
-            for q in range(used.shape[0]):
-                sums[q, first * columns_used * WIDTH : (L + PADDING) * columns_used * WIDTH] = 0.0
+            from_place, to_place = first * columns_used, (L + PADDING) * columns_used
+            sums[: used.shape[0], from_place:to_place] = 0.0
+            if total <= 2:
+                lanes[from_place * WIDTH : to_place * WIDTH] = 0.0
             for start in range(low, high, RINGS):
                 inside = load_start(starts[j], start, 1.0, before, now, scale)
                 is_north = _load_argument(rings, start, work)
@@ -462,7 +465,7 @@ def _add_orders(
                         before,
                         now,
                         scale,
-                        sums[0],
+                        lanes,
                     )
                 else:
                     add_quartets_to_degrees(
@@ -481,6 +484,8 @@ def _add_orders(
                         values,
                         sums,
                     )
+            if total <= 2:
+                add_up_lanes(lanes, from_place, L * columns_used, sums[0])
             for t in range(total):
                 slot, k, target = _slot_of(run, m, sides, t % active), 2 * (t % 2), flm[t // active]
                 _collect(
@@ -510,7 +515,7 @@ def add_columns_to_harmonics(
     n_maps, padded = flm.shape[0], rings[0].size
     room = (
         _recursion_room(L),
-        np.empty((n_maps, 4 * WIDTH * (L + PADDING))),
+        (np.empty((n_maps, 4 * (L + PADDING))), np.empty(4 * WIDTH * (L + PADDING))),
         _block_room(n_maps, 4 * n_maps * padded),
         (np.empty((6, padded)), np.empty((runs.shape[0], 2, padded))),
     )

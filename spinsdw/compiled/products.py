@@ -6,9 +6,10 @@ a *quartet* of two complex series, are multiplied with them:
 
 - ``fill_values``             ``values[j, r] = mask[r] u_l(x_r)``, l = base + j, and moves on;
 - ``add_products_to_rings``   adds ``c[l, k] values[j, r]`` to the sums of the rings (synthesis);
-- ``add_products_to_degrees`` adds ``g[k, r] values[j, r]`` to the lanes of the degrees (adjoint).
+- ``add_products_to_degrees`` adds ``g[k, r] values[j, r]`` to the sums of the degrees (adjoint).
 
-What they add and in which order is what the tiles of four columns do: sums have the same bits.
+Sums over degrees add what the tiles of four columns do, in the same order: they have the same bits.
+Sums over rings add up the lanes of a block of rings first (`lane_sums`), the tiles last.
 Arrays are read as if they had one axis, from a place on: a view of a part would cost as much as
 a dozen degrees. Sums and columns of rings are rows, ``stride`` apart: a quartet is the rows at
 ``one``, ``one + stride``, ``other`` and ``other + stride``. Plain loops define each, as in
@@ -22,6 +23,7 @@ from typing import Any
 from numba.core import config, types
 from numba.extending import intrinsic
 
+from spinsdw.compiled.lane_sums import add_degrees, add_products, mix_columns
 from spinsdw.compiled.vectors import (
     RINGS,
     VECTORS,
@@ -30,6 +32,7 @@ from spinsdw.compiled.vectors import (
     _constant,
     _degree_loop,
     _Emitter,
+    _pair_loop,
     _pointers,
 )
 
@@ -134,8 +137,7 @@ def _make_ring_products(vectors: int, width: int) -> Any:
 def _make_degree_products(vectors: int, width: int) -> Any:
     """Build add_products_to_degrees(g, values, sums, base, pairs, place, one, other, stride).
 
-    The rows g stay in registers; sums[place + (4 l + k) width + lane] collects lanes of
-    base <= l < base + 2 pairs.
+    The rows g stay in registers; sums[place + 4 l + k] are the sums of base <= l < base + 2 pairs.
     """
 
     @intrinsic
@@ -145,23 +147,27 @@ def _make_degree_products(vectors: int, width: int) -> Any:
         def codegen(context, builder, sig, args):
             p_g, p_values, p_sums = _pointers(context, builder, sig, args, 3)
             emit = _Emitter(builder, width)
-            g_k = [
-                [emit.load(p_g, builder.add(row, _constant(v * width))) for v in range(vectors)]
-                for row in _rows(builder, *args[6:9])
+            rows = _rows(builder, *args[6:9])
+            mixed = [
+                mix_columns(
+                    emit, [emit.load(p_g, builder.add(row, _constant(v * width))) for row in rows]
+                )
+                for v in range(vectors)
             ]
 
             def step(el, state):
-                u = _values_of(emit, p_values, args[3], el, vectors)
-                first = builder.add(args[5], builder.mul(el, _constant(QUARTET * width)))
-                for k in range(QUARTET):
-                    where = builder.add(first, _constant(k * width))
-                    acc = emit.load(p_sums, where)
-                    for v in range(vectors):
-                        acc = emit.fma(g_k[k][v], u[v], acc)
-                    emit.store(acc, p_sums, where)
+                place = builder.add(args[5], builder.mul(el, _constant(QUARTET)))
+                found = []
+                for offset in range(2):
+                    here = builder.add(el, _constant(offset))
+                    u = _values_of(emit, p_values, args[3], here, vectors)
+                    found.append(add_products(emit, mixed, u))
+                for i, value in enumerate(add_degrees(emit, *found, QUARTET)):
+                    where = builder.add(place, _constant(i * width))
+                    emit.store(builder.fadd(emit.load(p_sums, where), value), p_sums, where)
                 return state
 
-            _degree_loop(emit, args[3], args[4], [], step)
+            _pair_loop(emit, args[3], args[4], [], step)
             return context.get_dummy_value()
 
         return sig, codegen
@@ -197,16 +203,15 @@ def _make_plain_ring_products(rings: int) -> Any:
     return tile
 
 
-def _make_plain_degree_products(rings: int, width: int) -> Any:
+def _make_plain_degree_products(rings: int) -> Any:
     """Build what `_make_degree_products` computes as plain loops."""
 
     def tile(g, values, sums, base, pairs, place, one, other, stride):
         g, sums = g.reshape(-1), sums.reshape(-1)[place:]
         for j in range(2 * pairs):
             for k, row in enumerate((one, one + stride, other, other + stride)):
-                first = ((base + j) * QUARTET + k) * width
                 for r in range(rings):
-                    sums[first + r % width] += g[row + r] * values[j * rings + r]
+                    sums[(base + j) * QUARTET + k] += g[row + r] * values[j * rings + r]
 
     return tile
 
@@ -214,7 +219,7 @@ def _make_plain_degree_products(rings: int, width: int) -> Any:
 if config.DISABLE_JIT:
     fill_values = _make_plain_values_tile(RINGS)
     add_products_to_rings = _make_plain_ring_products(RINGS)
-    add_products_to_degrees = _make_plain_degree_products(RINGS, WIDTH)
+    add_products_to_degrees = _make_plain_degree_products(RINGS)
 else:
     fill_values = _make_values_tile(VECTORS, WIDTH)
     add_products_to_rings = _make_ring_products(VECTORS, WIDTH)

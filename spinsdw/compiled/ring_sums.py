@@ -19,11 +19,13 @@ from spinsdw.compiled.products import (
 )
 from spinsdw.compiled.vectors import (
     RINGS,
+    WIDTH,
     add_to_degrees_2,
     add_to_degrees_4,
     add_to_rings_2,
     add_to_rings_4,
     advance,
+    sum_lanes,
 )
 from spinsdw.compiled.wigner_recursion import rescale
 
@@ -31,6 +33,7 @@ __all__ = [
     "CHUNK",
     "add_block_to_degrees",
     "add_quartets_to_degrees",
+    "add_up_lanes",
     "copy_rows",
     "copy_sums",
     "sum_block",
@@ -122,6 +125,13 @@ def add_block_to_degrees(
 
 
 @inner
+def add_up_lanes(lanes, first, stop, sums):
+    """sums[i] = sum of lanes[i, lane], first <= i < stop: after the last `add_block_to_degrees`."""
+    for i in range(first, stop):
+        sums[i] = sum_lanes(lanes, i * WIDTH)
+
+
+@inner
 def copy_sums(sums, columns, start, places, stride, rows):
     """Copy what `sum_block` found to its rows, which begin at places[0]; rows has one axis."""
     for k in range(columns):
@@ -206,7 +216,7 @@ def sum_quartets(
 def add_quartets_to_degrees(
     first, lowest, L, look, inside, start, places, stride, a, b, rows, work, values, sums
 ):
-    """sums[i, l, k, lane] += sum_r rows[i, k, r] u_l(x_r): the adjoint of `sum_quartets`."""
+    """sums[i, l, k] += sum_r rows[i, k, r] u_l(x_r): the adjoint of `sum_quartets`."""
     el = first
     if inside == 0 or first < lowest:
         el, inside = _pass_silent(first, lowest, L, look, inside, a, b, work, values)

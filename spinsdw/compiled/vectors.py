@@ -82,12 +82,16 @@ class _Emitter:
         stored = self.builder.store(value, self.builder.bitcast(place, self.type.as_pointer()))
         stored.align = 8
 
+    def shuffle(self, one: Any, other: Any, lanes: list[int]) -> Any:
+        """Return lanes of two vectors; those of ``other`` count from the width on."""
+        index = ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), lanes)
+        return self.builder.shuffle_vector(one, other, index)
+
     def broadcast(self, pointer: Any, index: Any) -> Any:
         scalar = self.builder.load(self.builder.gep(pointer, [index]))
         undefined = ir.Constant(self.type, ir.Undefined)
-        lanes = ir.Constant(ir.VectorType(ir.IntType(32), self.width), [0] * self.width)
         first = self.builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
-        return self.builder.shuffle_vector(first, undefined, lanes)
+        return self.shuffle(first, undefined, [0] * self.width)
 
     def fma(self, x: Any, y: Any, z: Any) -> Any:
         return self.builder.call(self._fma, [x, y, z])
@@ -110,6 +114,17 @@ def _degree_loop(
     ``carried`` are the vectors that live in registers; ``step(l, carried) -> carried`` emits the
     body for one degree.
     """
+
+    def both(el: Any, state: list[Any]) -> list[Any]:
+        for offset in range(2):
+            state = step(emit.builder.add(el, _constant(offset)), state)
+        return state
+
+    return _pair_loop(emit, first, pairs, carried, both)
+
+
+def _pair_loop(emit: _Emitter, first: Any, pairs: Any, carried: list[Any], step: Any) -> list[Any]:
+    """Emit what `_degree_loop` does, with ``step`` the body for l and l + 1."""
     builder = emit.builder
     before = builder.block
     loop = builder.append_basic_block("degrees")
@@ -119,9 +134,7 @@ def _degree_loop(
     count = emit.phi(_constant(0), before)
     el = emit.phi(first, before)
     nodes = [emit.phi(vector, before) for vector in carried]
-    state = list(nodes)
-    for offset in range(2):
-        state = step(builder.add(el, _constant(offset)), state)
+    state = step(el, list(nodes))
     count_next = builder.add(count, _constant(1))
     count.add_incoming(count_next, loop)
     el.add_incoming(builder.add(el, _constant(2)), loop)

@@ -82,20 +82,21 @@ def test_products_with_rings_are_the_plain_ones(width, count):
 @needs_compiler
 @pytest.mark.parametrize(("width", "count"), SHAPES)
 def test_products_with_degrees_are_the_plain_ones(width, count):
-    """The lanes of a degree gain sum_r g[k, r] values[l, r] over the rings of each lane."""
+    """The sums of a degree, wherever they begin, gain sum_r g[k, r] values[l, r]; others do not."""
     rings = width * count
     tile = compiled(products._make_degree_products(count, width))
-    plain = products._make_plain_degree_products(rings, width)
+    plain = products._make_plain_degree_products(rings)
     _, values, rows, stride = quartets(rings)
-    lanes = draw(2, QUARTET * DEGREES * width, seed=5)
+    given = draw(2, QUARTET * DEGREES, seed=5)
     for first, pairs in RANGES:
-        where = (first, pairs, lanes.shape[1], 2, 3 * stride + 1, stride)
+        where = (first, pairs, given.shape[1], 2, 3 * stride + 1, stride)
         results = []
         for call in (tile, plain):
-            sums = lanes.copy()
+            sums = given.copy()
             call(rows, values, sums, *where)
             results.append(sums)
         assert_close(*results, ulps=64)
+        assert np.count_nonzero(results[0] - given) == 2 * pairs * QUARTET
 
 
 def test_plain_products_are_those_of_one_tile():
@@ -116,15 +117,15 @@ def test_plain_products_are_those_of_one_tile():
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_two_plain_products_are_adjoint(seed):
-    """<sum_l c u, g> over rings = <c, sum_r g u> over degrees, the lanes added up."""
-    rings, width, pairs = 8, 4, 20
+    """<sum_l c u, g> over rings = <c, sum_r g u> over degrees."""
+    rings, pairs = 8, 20
     c, values, _, _ = quartets(rings, seed=seed)
     g = draw(QUARTET, rings, seed=seed + 7)
     over_degrees = np.zeros((QUARTET, rings))
     where = (0, pairs, 0, 0, 2 * rings, rings)
     products._make_plain_ring_products(rings)(c, values, over_degrees, *where)
-    over_rings = np.zeros(DEGREES * QUARTET * width)
-    products._make_plain_degree_products(rings, width)(g, values, over_rings, *where)
+    over_rings = np.zeros(DEGREES * QUARTET)
+    products._make_plain_degree_products(rings)(g, values, over_rings, *where)
     left = np.vdot(over_degrees, g)
-    right = np.vdot(c[0], over_rings.reshape(-1, width).sum(axis=1))
+    right = np.vdot(c[0], over_rings)
     assert abs(left - right) <= 1e-14 * np.linalg.norm(over_degrees) * np.linalg.norm(g)

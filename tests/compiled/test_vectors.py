@@ -158,15 +158,16 @@ transform = SpinHarmonicTransform(int(sys.argv[2]), 2, threads=1)
 with np.load(sys.argv[1]) as given:
     flm, noise = given["flm"], given["noise"]
 synthesis, adjoint = transform.synthesis(flm), transform.adjoint_synthesis(noise)
-np.savez(sys.argv[1], flm=flm, noise=noise, synthesis=synthesis, adjoint=adjoint)
+alone = transform.adjoint_synthesis(noise[0])
+np.savez(sys.argv[1], flm=flm, noise=noise, synthesis=synthesis, adjoint=adjoint, alone=alone)
 """
 
 
 def run_elsewhere(folder, bandlimit, **settings):
-    """Transform in a process of its own, with these environment variables."""
+    """Transform two maps, and one alone, in a process of its own with these variables."""
     transform = SpinHarmonicTransform(bandlimit, 2)
-    flm = random_flm(bandlimit, 2)
-    noise = transform.synthesis(random_flm(bandlimit, 2, seed=1))
+    flm = random_flm(bandlimit, 2, batch=(2,))
+    noise = transform.synthesis(random_flm(bandlimit, 2, seed=1, batch=(2,)))
     path = folder / "arrays.npz"
     np.savez(path, flm=flm, noise=noise)
     subprocess.run(
@@ -178,7 +179,9 @@ def run_elsewhere(folder, bandlimit, **settings):
     )
     with np.load(path) as found:
         assert_close(found["synthesis"], transform.synthesis(flm), ulps=8 * bandlimit)
-        assert_close(found["adjoint"], transform.adjoint_synthesis(noise), ulps=8 * bandlimit)
+        adjoint = transform.adjoint_synthesis(noise)
+        assert_close(found["adjoint"], adjoint, ulps=8 * bandlimit)
+        assert_close(found["alone"], adjoint[0], ulps=8 * bandlimit)
 
 
 @needs_compiler
