@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from spinsdw.fourier import fill_maps, fill_maps_columns
-from spinsdw.mirror_engine import MirrorEngine
 from spinsdw.parallel import run_tasks, threads_for
+from spinsdw.parity_engine import ParityEngine, interleaved_rings, mirrored_rings
+from spinsdw.refined_sums import RefinedSums
 from spinsdw.ring_engine import OrderSums, RingEngine
 from spinsdw.sampling.base import Sampling
+from spinsdw.sampling.equiangular import MW
 from spinsdw.signals import stored_dtype
 
 __all__ = ["GridSums", "engine_of", "fill_negative_orders"]
@@ -40,18 +42,23 @@ _SCRATCH_ARRAYS = 4
 
 
 @functools.lru_cache(maxsize=64)
-def engine_of(sampling: Sampling) -> RingEngine:
-    """Return the sums over degree on the rings of a sampling."""
+def _ring_engine(sampling: Sampling) -> RingEngine:
     rings = sampling.colatitudes
     if sampling.is_symmetric:
         return RingEngine(sampling.bandlimit, rings[: (rings.size + 1) // 2], symmetric=True)
     return RingEngine(sampling.bandlimit, rings)
 
 
-@functools.lru_cache(maxsize=64)
-def _mirror_engine(sampling: Sampling, order: int) -> MirrorEngine:
-    north = sampling.colatitudes[: (sampling.n_rings + 1) // 2]
-    return MirrorEngine(sampling.bandlimit, north, order)
+@functools.lru_cache(maxsize=128)
+def engine_of(sampling: Sampling, orders: tuple[int, ...]) -> RingEngine | ParityEngine:
+    """Return the sums over degree on the rings of a sampling."""
+    is_interleaved = isinstance(sampling, MW)
+    if sampling.is_symmetric or is_interleaved:
+        half = (interleaved_rings if is_interleaved else mirrored_rings)(sampling.colatitudes)
+        engine = ParityEngine(sampling.bandlimit, half, orders)
+        if engine.is_worthwhile:
+            return engine
+    return _ring_engine(sampling)
 
 
 def fill_negative_orders(flm: Array) -> None:
@@ -124,17 +131,20 @@ class GridSums:
         """Return how many complex numbers hold the Fourier columns of all outputs."""
         return min(batch, self._maps_together) * math.prod(self._columns_shape)
 
-    @property
-    def scratch_bytes(self) -> int:
-        """Bytes that a call takes beyond its input, output and workspace."""
+    def scratch_bytes(self, batch: int = 1) -> int:
+        """Return the bytes that a call takes beyond its input, output and workspace."""
         circle = 16 * self.sampling.n_phi * len(self.orders)
         batches = self._threads * max(_TASK_BYTES, circle)
         circles = (self._n_m + 1) // 2 * circle
-        return _SCRATCH_ARRAYS * min(batches, circles)
+        refined = self._refined
+        more = refined.room_bytes(min(batch, self._maps_together)) if refined else 0
+        return _SCRATCH_ARRAYS * min(batches, circles) + more
 
     def working_bytes(self, batch: int = 1) -> int:
         """Return the bytes that a call takes beyond its input and output."""
-        return np.dtype(self.dtype).itemsize * self.workspace_size(batch) + self.scratch_bytes
+        return np.dtype(self.dtype).itemsize * self.workspace_size(batch) + self.scratch_bytes(
+            batch
+        )
 
     @property
     def maps_itemsize(self) -> int:
@@ -163,41 +173,16 @@ class GridSums:
         return columns
 
     @property
-    def _mirror(self) -> MirrorEngine | None:
-        """The faster sums of a single order on rings that mirror each other."""
-        if len(self.orders) > 1 or not self.sampling.is_symmetric:
+    def _engine(self) -> RingEngine | ParityEngine:
+        return engine_of(self.sampling, self.orders)
+
+    @property
+    def _refined(self) -> RefinedSums | None:
+        """The sums on refined rings, if they are the way of the quadrature."""
+        if not isinstance(self.sampling, MW):
             return None
-        return _mirror_engine(self.sampling, self.orders[0])
-
-    def _fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, columns: Array) -> None:
-        from spinsdw.compiled.columns import clear_outer_rings
-
-        mirror = self._mirror
-        if mirror is None:
-            engine_of(self.sampling).fill_columns(flm, sums, mixing, columns)
-            return
-        for given, room in self._single_rows(flm, columns):
-            mirror.fill_columns(given, sums, room)
-        for one in columns:
-            clear_outer_rings(mirror.limits, sums.sides, one[0])
-            if not np.array_equal(mixing, [[1.0]]):
-                self._mix(mixing, one)
-
-    def _add_columns(self, columns: Array, sums: OrderSums, out: Array) -> None:
-        mirror = self._mirror
-        if mirror is None:
-            engine_of(self.sampling).add_to_harmonics(columns, sums, out)
-            return
-        for given, room in self._single_rows(out, columns):
-            mirror.add_to_harmonics(room, sums, given)
-
-    @staticmethod
-    def _single_rows(flm: Array, columns: Array) -> Iterator[tuple[Array, Array]]:
-        """Give the coefficients and the first columns of maps that lie side by side in memory."""
-        if columns.shape[1] == 1:
-            yield flm[:, 0], columns[:, 0]
-        else:
-            yield from ((one, several[:1]) for one, several in zip(flm, columns, strict=True))
+        refined = RefinedSums(self.sampling, self.orders, self.mixing, self.real, self._threads)
+        return refined if refined.engine.is_worthwhile else None
 
     def _share(self, call: Callable[[int, int], None], size: int, step: int) -> None:
         run_tasks(_ranges(call, size, step), self._threads)
@@ -246,15 +231,17 @@ class GridSums:
         return [slice(first, first + step) for first in range(0, batch, step)]
 
     def _fill_together(self, flm: Array, sums: OrderSums, maps: Array, *, quadrature: bool) -> None:
-        columns = self._columns(len(flm))
-        if quadrature:
+        columns, refined = self._columns(len(flm)), self._refined
+        if quadrature and refined:
+            refined.fill_columns(flm, sums, columns)
+        elif quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
-            self._fill_columns(flm, sums, identity, columns)
+            self._engine.fill_columns(flm, sums, identity, columns)
             for one in columns:
                 self._weigh(one, identity)
                 self._mix(self.mixing, one)
         else:
-            self._fill_columns(flm, sums, self.mixing, columns)
+            self._engine.fill_columns(flm, sums, self.mixing, columns)
         outputs = self.mixing.shape[0]
         self._share_rings(
             lambda i, a, b: fill_maps(columns[i, :outputs, :, a:b], maps[i, :, a:b]),
@@ -295,10 +282,14 @@ class GridSums:
             len(maps),
             outputs,
         )
+        refined = self._refined
+        if quadrature and refined:
+            refined.add_to_harmonics(columns, sums, out)
+            return
         unmixing = np.ascontiguousarray(self.mixing.conj().T)
         for one in columns:
             if quadrature:
                 self._weigh(one, unmixing)
             elif not np.array_equal(unmixing, [[1.0]]):
                 self._mix(unmixing, one)
-        self._add_columns(columns, sums, out)
+        self._engine.add_to_harmonics(columns, sums, out)

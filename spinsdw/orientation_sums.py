@@ -67,12 +67,12 @@ class OrientationSums:
         sizes = (sums.workspace_size(min(batch, 1)) for sums, *_ in self._groups())
         return max(sizes, default=0)
 
-    @property
-    def scratch_bytes(self) -> int:
-        """Bytes that a call takes beyond its input, output and workspace."""
+    def scratch_bytes(self, batch: int = 1) -> int:
+        """Return the bytes that a call takes beyond its input, output and workspace."""
         size = np.dtype(self.dtype).itemsize
         groups = [
-            sums.scratch_bytes + size * math.prod(sums.maps_shape) for sums, *_ in self._groups()
+            sums.scratch_bytes(min(batch, 1)) + size * math.prod(sums.maps_shape)
+            for sums, *_ in self._groups()
         ]
         # The maps of the orders; `to_grid` puts complex ones in the output itself.
         return max(groups, default=0) + size * math.prod(self._spectrum_shape)

@@ -186,7 +186,7 @@ class PointSums:
     def _to_many_points(self, flm: Array) -> Array:
         size = self._bandlimit
         columns = self._columns(size)
-        engine = engine_of(MW(size))
+        engine = engine_of(MW(size), self.sums.orders)
         engine.fill_columns(flm[None], self.sums, np.ones((1, 1), dtype=complex), columns)
         modes = np.empty((columns.shape[1], 2 * size - 1), dtype=np.complex128)
         modes[:, :size] = columns[0]
@@ -211,7 +211,7 @@ class PointSums:
         from_series(modes, modes)
         columns[0] = modes[:, :size]
         columns[0, :, : size - 1] += self._parities * modes[:, : size - 1 : -1]
-        engine_of(MW(size)).add_to_harmonics(columns, self.sums, out[None])
+        engine_of(MW(size), self.sums.orders).add_to_harmonics(columns, self.sums, out[None])
 
     @property
     def _threads(self) -> int:

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from spinsdw.fourier import fill_orders, fill_rings, from_series, to_series
-from spinsdw.mirror_engine import MirrorEngine
+from spinsdw.parity_engine import ParityEngine, mirrored_rings
 from spinsdw.sampling.healpix_rings import HealpixRings
 
-__all__ = ["BeltBlock", "CapBlock", "mirror_engine", "ring_blocks", "task_bytes"]
+__all__ = ["BeltBlock", "CapBlock", "healpix_engine", "ring_blocks", "task_bytes"]
 
 Array = np.ndarray[Any, Any]
 
@@ -33,10 +33,10 @@ def task_bytes(nside: int) -> int:
 
 
 @functools.lru_cache(maxsize=32)
-def mirror_engine(nside: int, bandlimit: int, order: int) -> MirrorEngine:
+def healpix_engine(nside: int, bandlimit: int, order: int) -> ParityEngine:
     """Return the sums of one order on the rings of HEALPix."""
-    north = HealpixRings(nside).colatitudes[: 2 * nside]
-    return MirrorEngine(bandlimit, north, order)
+    half = mirrored_rings(HealpixRings(nside).colatitudes)
+    return ParityEngine(bandlimit, half, (order,), clears=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ def ring_blocks(nside: int, bandlimit: int, order: int) -> list[BeltBlock | CapB
     """Split the rings of HEALPix into blocks, each the work of one task."""
     layout = HealpixRings(nside)
     sizes, phis, starts = layout.n_phi, layout.first_longitudes, layout.starts
-    north = mirror_engine(nside, bandlimit, order).limits
+    north = healpix_engine(nside, bandlimit, order).limits
     limits = np.concatenate([north, north[-2::-1]])
     blocks: list[BeltBlock | CapBlock] = []
     for rings in _cap_groups(nside, limits):

@@ -16,10 +16,12 @@ import numpy as np
 
 from spinsdw.parallel import run_tasks
 
-__all__ = ["OrderCall", "OrderSums", "RingEngine", "make_runs", "share_orders"]
+__all__ = ["OrderCall", "OrderSums", "RingEngine", "RowPlaces", "make_runs", "share_orders"]
 
 Array = np.ndarray[Any, Any]
 OrderCall = Callable[[int, int], None]
+# (a, b): columns of order m are in row m - a, those of -m in row b - m.
+RowPlaces = tuple[int, int]
 
 # exp(-45) = 2**-65: d^l_mn below it adds nothing to a sum in double precision.
 _NEGLIGIBLE = 45.0
@@ -128,11 +130,14 @@ class RingEngine:
         Increasing, in [0, pi]; of a symmetric grid the northern rings and the equator.
     symmetric : bool
         Whether the rings pi - theta belong to the grid too.
+    first_ring : int
+        Where the rings begin in columns of more rings; only if not symmetric.
     """
 
     bandlimit: int
     colatitudes: Array
     symmetric: bool = False
+    first_ring: int = 0
 
     @functools.cached_property
     def tables(self) -> tuple[Array, Array, Array]:
@@ -179,10 +184,18 @@ class RingEngine:
         windows = self.windows(max(abs(n) for n in sums.orders))
         return runs, windows
 
-    def filling(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> OrderCall:
-        """Return what fills the orders first <= m < stop of ``out[..., k, m, ring]``.
+    def filling(
+        self,
+        flm: Array,
+        sums: OrderSums,
+        mixing: Array,
+        out: Array,
+        rows: RowPlaces | None = None,
+    ) -> OrderCall:
+        """Return what fills the orders first <= m < stop of ``out[..., k, row, ring]``.
 
-        Shapes as in `compiled.order_sums.fill_columns`; both arrays may be without a batch.
+        Shapes as in `compiled.order_sums.fill_columns`; both arrays may be without a batch. By
+        default m is in row m and -m in the m-th from the end.
         """
         from spinsdw.compiled.order_sums import fill_columns
 
@@ -191,12 +204,16 @@ class RingEngine:
         runs, windows = self._geometry(sums)
         inputs = (self.bandlimit, sums.lowest, sums.sides, flm, sums.weights, runs, mixing)
         geometry = (self.rings, windows, self.tables)
-        return lambda first, stop: fill_columns(first, stop, *inputs, *geometry, out)
+        place = (*(rows or (0, out.shape[-2])), self.first_ring)
+        return lambda first, stop: fill_columns(first, stop, *inputs, *geometry, place, out)
 
-    def adding(self, columns: Array, sums: OrderSums, out: Array) -> OrderCall:
+    def adding(
+        self, columns: Array, sums: OrderSums, out: Array, rows: RowPlaces | None = None
+    ) -> OrderCall:
         """Return what adds to the coefficients ``out`` of the orders first <= m < stop.
 
-        Shapes as in `compiled.order_sums.add_columns_to_harmonics`, or without a batch.
+        Shapes as in `compiled.order_sums.add_columns_to_harmonics`, or without a batch; rows as in
+        `filling`.
         """
         from spinsdw.compiled.order_sums import add_columns_to_harmonics
 
@@ -204,7 +221,8 @@ class RingEngine:
             columns, out = columns[None], out[None]
         runs, windows = self._geometry(sums)
         inputs = (self.bandlimit, sums.lowest, sums.sides, columns, sums.weights, runs)
-        geometry = (self.rings, windows, self.tables)
+        place = (*(rows or (0, columns.shape[-2])), self.first_ring)
+        geometry = (self.rings, windows, self.tables, place)
         return lambda first, stop: add_columns_to_harmonics(first, stop, *inputs, *geometry, out)
 
     def fill_columns(self, flm: Array, sums: OrderSums, mixing: Array, out: Array) -> None:

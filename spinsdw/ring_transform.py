@@ -14,9 +14,9 @@ from spinsdw.errors import ParameterError
 from spinsdw.grid_sums import fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.memory import MemoryEstimate, check_max_memory
-from spinsdw.mirror_engine import MirrorEngine
 from spinsdw.parallel import resolve_threads, run_tasks, threads_for
-from spinsdw.ring_blocks import BeltBlock, CapBlock, mirror_engine, ring_blocks, task_bytes
+from spinsdw.parity_engine import ParityEngine
+from spinsdw.ring_blocks import BeltBlock, CapBlock, healpix_engine, ring_blocks, task_bytes
 from spinsdw.ring_engine import OrderSums
 from spinsdw.sampling.healpix_rings import HealpixRings
 from spinsdw.signals import check_flag, check_map, check_spin, writable
@@ -124,8 +124,8 @@ class HealpixTransform:
         return (n_m, self.rings.n_rings)
 
     @property
-    def _engine(self) -> MirrorEngine:
-        return mirror_engine(self.nside, self.bandlimit, -self.spin)
+    def _engine(self) -> ParityEngine:
+        return healpix_engine(self.nside, self.bandlimit, -self.spin)
 
     @property
     def _maps_dtype(self) -> type[np.generic]:
@@ -189,13 +189,14 @@ class HealpixTransform:
 
     def _fill_maps(self, flm: Array, maps: Array) -> None:
         columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
-        self._engine.fill_columns(flm, self._sums, columns)
+        one = np.ones((1, 1), dtype=np.complex128)
+        self._engine.fill_columns(flm[:, None], self._sums, one, columns[:, None])
         self._share_rings(lambda block, i: block.fill_pixels(columns[i], maps[i]), len(maps))
 
     def _add_coefficients(self, maps: Array, flm: Array) -> None:
         columns = np.empty((len(flm), *self._columns_shape), dtype=np.complex128)
         self._share_rings(lambda block, i: block.fill_columns(maps[i], columns[i]), len(maps))
-        self._engine.add_to_harmonics(columns, self._sums, flm)
+        self._engine.add_to_harmonics(columns[:, None], self._sums, flm[:, None])
 
     def synthesis(self, flm: Array) -> Array:
         """Compute maps from harmonic coefficients.

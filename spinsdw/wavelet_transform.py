@@ -300,7 +300,7 @@ class SpinWaveletTransform(WaveletFrame):
         wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
         scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
         room = np.dtype(self.dtype).itemsize * max(one.workspace_size(batch) for one in sums)
-        working = room + max(one.scratch_bytes for one in sums)
+        working = room + max(one.scratch_bytes(batch) for one in sums)
         # The scaling part has coefficients of its own: on the way there before any scale has.
         part = scaling.input + scaling.working
         there = MemoryEstimate(flm, scaling.output + wavelets, max(working, part - wavelets))

@@ -9,7 +9,7 @@ import numpy as np
 
 from spinsdw.compiled.jit import kernel
 
-__all__ = ["clear_outer_rings", "fill_circles", "fold_circles", "mix_columns"]
+__all__ = ["fill_circles", "fold_circles", "join_circles", "mix_columns", "split_circles"]
 
 
 @kernel
@@ -26,18 +26,6 @@ def mix_columns(mixing, first_m, stop_m, columns):
                 for k in range(n_in):
                     value += mixing[i, k] * values[k]
                 columns[i, m, r] = value
-
-
-@kernel
-def clear_outer_rings(limits, sides, columns):
-    """columns[+-m, ring] <- 0 for m >= limits[ring], and for its mirror image; -m at n_m - m."""
-    n_m, n_rings = columns.shape
-    for i in range(n_m):
-        m = i if sides == 1 else min(i, n_m - i)
-        for r in range(limits.size):
-            if limits[r] <= m:
-                columns[i, r] = 0.0
-                columns[i, n_rings - 1 - r] = 0.0
 
 
 @kernel
@@ -104,3 +92,55 @@ def fold_circles(circles, weights, shifted, even, odd, parities, offset, columns
                     columns[i, even[j], t] = values[t] if parity > 0 else 0.0j
                 if odd[j] >= 0:
                     columns[i, odd[j], t] = 0.0j if parity > 0 else values[t]
+
+
+@kernel
+def split_circles(circles, weights, rows, parities, offset, shift, fine):
+    """Give every second ring of the fine rows its weighted value: circles t are rings 2 t + shift.
+
+    Row i of order n has the columns of even m, rows[0], and of odd m, rows[1] (-1: none), which a
+    circle holds together (`fill_circles`). ``shift`` is 1 for circles half a step on; then ring
+    2 t + offset + shift is point t, and point size - offset - shift - t is at minus its colatitude.
+    """
+    size = circles.shape[2]
+    spare = np.empty(size + 1, dtype=np.complex128)
+    start = offset + shift
+    for i in range(circles.shape[0]):
+        parity = parities[i]
+        for j in range(circles.shape[1]):
+            values = circles[i, j]
+            even = fine[i, rows[0, j]] if rows[0, j] >= 0 else spare
+            odd = fine[i, rows[1, j]] if rows[1, j] >= 0 else spare
+            for t in range(1 if start == 0 else 0, (size - start + 1) // 2):
+                here, opposite = values[t], parity * values[size - start - t]
+                even[2 * t + start] = weights[t] * (here + opposite)
+                odd[2 * t + start] = weights[t] * (here - opposite)
+            # At a pole the odd-parity function vanishes.
+            for ring in (0, size):
+                if (ring - start) % 2 == 0:
+                    t = (ring - start) // 2 % size
+                    value = weights[t] * values[t]
+                    even[ring] = value if parity > 0 else 0.0j
+                    odd[ring] = 0.0j if parity > 0 else value
+
+
+@kernel
+def join_circles(fine, weights, rows, parities, offset, shift, circles):
+    """Transpose of `split_circles`."""
+    size = circles.shape[2]
+    nothing = np.zeros(size + 1, dtype=np.complex128)
+    start = offset + shift
+    for i in range(circles.shape[0]):
+        parity = parities[i]
+        for j in range(circles.shape[1]):
+            values = circles[i, j]
+            even = fine[i, rows[0, j]] if rows[0, j] >= 0 else nothing
+            odd = fine[i, rows[1, j]] if rows[1, j] >= 0 else nothing
+            for t in range(1 if start == 0 else 0, (size - start + 1) // 2):
+                here, other = even[2 * t + start], odd[2 * t + start]
+                values[t] = weights[t] * (here + other)
+                values[size - start - t] = parity * weights[t] * (here - other)
+            for ring in (0, size):
+                if (ring - start) % 2 == 0:
+                    t = (ring - start) // 2 % size
+                    values[t] = weights[t] * (even[ring] if parity > 0 else odd[ring])

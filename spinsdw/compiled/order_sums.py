@@ -10,7 +10,7 @@ complex series F_i(sigma m), sigma = +-1, of orders n_i at theta or at the mirro
     -      mirrored  n_i =  n  (-1)^(l + n) d^l_mn
 
 ``runs`` has one row a run: n, then (i, sigma, mirrored) twice, i = -1 for "no series". Columns are
-complex arrays [map, k, m, ring], -m at place n_m - m.
+complex arrays [map, k, row, ring], with a row for each of the orders +-m that a caller wants.
 
 The series of a run, of all maps, are taken in pairs: one pair goes through the tiles of four real
 columns, and more of them share values as quartets (`ring_sums`). The real and the imaginary part of
@@ -163,14 +163,14 @@ def _load_argument(rings, start, work):
 
 
 @inner
-def _mix_series(m, n_rings, mixing, series, mixed, columns):
+def _mix_series(m, place, n_rings, mixing, series, mixed, columns):
     """columns[k, +-m, ring] = sum_i mixing[k, i] series[i]; a mirrored ring counts from the end."""
     n_out, n_orders = mixing.shape
-    n_m, total = columns.shape[1], columns.shape[2]
+    total = columns.shape[2]
     for half in range(series.shape[2]):
         for side in range(2 if m > 0 and series.shape[1] > 1 else 1):
             for k in range(n_out):
-                out = columns[k, m if side == 0 else n_m - m]
+                out = columns[k, m - place[0] if side == 0 else place[1] - m]
                 mixed[:] = 0.0
                 for i in range(n_orders):
                     p, q = mixing[k, i].real, mixing[k, i].imag
@@ -179,11 +179,25 @@ def _mix_series(m, n_rings, mixing, series, mixed, columns):
                         mixed[0, r] += p * real[r] - q * imaginary[r]
                         mixed[1, r] += p * imaginary[r] + q * real[r]
                 if half == 0:
+                    here = out[place[2] :]
                     for r in range(n_rings):
-                        out[r] = complex(mixed[0, r], mixed[1, r])
+                        here[r] = complex(mixed[0, r], mixed[1, r])
                 else:
                     for r in range(n_rings):
                         out[total - 1 - r] = complex(mixed[0, r], mixed[1, r])
+
+
+@inner
+def _clear_rings(m, place, n_rings, sides, halves, columns):
+    """Set the columns of +-m to zero on the rings."""
+    total = columns.shape[3]
+    for i in range(columns.shape[0]):
+        for k in range(columns.shape[1]):
+            for side in range(2 if m > 0 and sides > 1 else 1):
+                out = columns[i, k, m - place[0] if side == 0 else place[1] - m]
+                out[place[2] : place[2] + n_rings] = 0.0
+                if halves > 1:
+                    out[total - n_rings :] = 0.0
 
 
 @inner
@@ -226,6 +240,7 @@ def _fill_orders(
     windows,
     tables,
     room,
+    place,
     columns,
 ):
     """Fill the columns of some orders; ``room`` is what `fill_columns` allocates."""
@@ -233,21 +248,23 @@ def _fill_orders(
     (before, now, scale, sums, _), work, values, places, rows = blocks
     n_runs, padded = runs.shape[0], rings[0].size
     for m in range(first_m, stop_m):
-        _gather(m, L, flm, gathered)
         is_new = m == first_m or m % M_CHUNK == 0
         low, high = windows[0, m], windows[1, m]
+        if high <= low:
+            _clear_rings(m, place, padded - RINGS, sides, series.shape[3], columns)
+            continue
+        _gather(m, L, flm, gathered)
         filled = 2 * L
         for j in range(n_runs):
             run = runs[j]
             n = run[0]
             first = max(m, abs(n))
-            is_empty = first >= L or high <= low
-            if not is_empty:
+            if first < L:
                 # The last block of any later m, too, ends there.
                 stop = high + RINGS
                 prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
             total = _place_series(run, m, sides, series.shape, padded, places, rows)
-            if total == 0 or is_empty:
+            if total == 0 or first >= L:
                 continue
             _prepare_recursion(m, n, L, filled == -n and n != 0, tables, recursion)
             filled = n
@@ -302,7 +319,7 @@ def _fill_orders(
                         rows,
                     )
         for i in range(flm.shape[0]):
-            _mix_series(m, padded - RINGS, mixing, series[i], mixed, columns[i])
+            _mix_series(m, place, padded - RINGS, mixing, series[i], mixed, columns[i])
 
 
 @kernel
@@ -317,14 +334,28 @@ def _block_room(pairs, size):
 
 @kernel
 def fill_columns(
-    first_m, stop_m, L, lowest, sides, flm, weights, runs, mixing, rings, windows, tables, columns
+    first_m,
+    stop_m,
+    L,
+    lowest,
+    sides,
+    flm,
+    weights,
+    runs,
+    mixing,
+    rings,
+    windows,
+    tables,
+    place,
+    columns,
 ):
     """Fill columns[., k, m, ring] = sum_i mixing[k, i] sum_l weights[i, l] f_lm d^l_{m, n_i}.
 
     flm: (maps, 1 or orders, at least L*L); weights: (orders, L) complex; mixing: (outputs, orders)
     complex; rings: (sin, 1 + cos, 1 - cos, cos - 1) of the computed rings and RINGS more; windows:
     (2, L) first and last ring that matter at each m; tables: (sqrt(k), central binomials, 1 / k);
-    columns: (maps, outputs, n_m, all rings), of m >= 0 only for ``sides`` = 1.
+    columns: (maps, outputs, rows, all rings), with orders m and -m in rows m - place[0] and
+    place[1] - m, of m >= 0 only for ``sides`` = 1, and the computed rings from place[2] on.
     """
     n_maps, n_orders, n_runs = flm.shape[0], weights.shape[0], runs.shape[0]
     halves, padded = max(runs[:, 3].max(), runs[:, 6].max()) + 1, rings[0].size
@@ -353,19 +384,20 @@ def fill_columns(
         windows,
         tables,
         room,
+        place,
         columns,
     )
 
 
 @inner
-def _load_rows(run, slot, m, low, high, n_rings, columns, stride, rows):
+def _load_rows(run, slot, m, place, low, high, n_rings, columns, stride, rows):
     """Copy one series' rings of order sigma m into two rows, zero beyond the last ring."""
     i, sigma, mirrored = run[1 + 3 * slot], run[2 + 3 * slot], run[3 + 3 * slot]
-    total = columns.shape[2]
-    source = columns[i, m if sigma > 0 or m == 0 else columns.shape[1] - m]
+    total, first = columns.shape[2], place[2]
+    source = columns[i, m - place[0] if sigma > 0 or m == 0 else place[1] - m]
     last = min(high, n_rings)
     for r in range(low, last):
-        value = source[total - 1 - r if mirrored == 1 else r]
+        value = source[total - 1 - r if mirrored == 1 else first + r]
         rows[r] = value.real
         rows[stride + r] = value.imag
     # The equator of a symmetric grid is its own mirror image: it counts once.
@@ -376,18 +408,18 @@ def _load_rows(run, slot, m, low, high, n_rings, columns, stride, rows):
 
 
 @inner
-def _load_series(run, m, sides, low, high, n_rings, columns, stride, places, rows):
+def _load_series(run, m, sides, place, low, high, n_rings, columns, stride, places, rows):
     """Copy all series of a run; return their number."""
     active = _count_active(run, m, sides)
     total = columns.shape[0] * active
     for t in range(total + (total & 1)):
-        place = 2 * t * stride
-        places[t // 2, t % 2] = place
+        start = 2 * t * stride
+        places[t // 2, t % 2] = start
         if t == total:
-            rows[place : place + 2 * stride] = 0.0
+            rows[start : start + 2 * stride] = 0.0
         else:
             slot, given = _slot_of(run, m, sides, t % active), columns[t // active]
-            _load_rows(run, slot, m, low, high, n_rings, given, stride, rows[place:])
+            _load_rows(run, slot, m, place, low, high, n_rings, given, stride, rows[start:])
     return total
 
 
@@ -408,7 +440,20 @@ def _collect(run, slot, k, columns_used, m, L, lowest, weights, scale, sums, flm
 
 @inner
 def _add_orders(
-    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
+    first_m,
+    stop_m,
+    L,
+    lowest,
+    sides,
+    columns,
+    weights,
+    runs,
+    rings,
+    windows,
+    tables,
+    room,
+    place,
+    flm,
 ):
     """Add to the coefficients of some orders; ``room`` is what the caller allocates."""
     recursion, (sums, lanes), blocks, (powers, starts) = room
@@ -431,7 +476,7 @@ def _add_orders(
             if is_empty:
                 continue
             total = _load_series(
-                run, m, sides, low, covered, padded - RINGS, columns, padded, places, rows
+                run, m, sides, place, low, covered, padded - RINGS, columns, padded, places, rows
             )
             if total == 0:
                 continue
@@ -505,11 +550,11 @@ def _add_orders(
 
 @kernel
 def add_columns_to_harmonics(
-    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, flm
+    first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, place, flm
 ):
     """f_lm += sum_i weights[i, l] sum_ring d^l_{m, n_i}(theta) columns[., i, m, ring].
 
-    columns: (maps, at least orders, n_m, all rings); flm: (maps, 1 or orders, at least L*L); the
+    columns: (maps, at least orders, rows, all rings); flm: (maps, 1 or orders, at least L*L); the
     rest as in `fill_columns`, whose adjoint this is for conjugated weights and no mixing.
     """
     n_maps, padded = flm.shape[0], rings[0].size
@@ -520,5 +565,18 @@ def add_columns_to_harmonics(
         (np.empty((6, padded)), np.empty((runs.shape[0], 2, padded))),
     )
     _add_orders(
-        first_m, stop_m, L, lowest, sides, columns, weights, runs, rings, windows, tables, room, flm
+        first_m,
+        stop_m,
+        L,
+        lowest,
+        sides,
+        columns,
+        weights,
+        runs,
+        rings,
+        windows,
+        tables,
+        room,
+        place,
+        flm,
     )

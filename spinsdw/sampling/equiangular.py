@@ -23,6 +23,7 @@ import numpy as np
 from spinsdw.parallel import run_tasks
 from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.half_step import HalfStep, modes
+from spinsdw.sampling.refinement import RingRefinement
 
 __all__ = ["MW", "MWSS"]
 
@@ -80,6 +81,11 @@ class _Equiangular(Sampling):
         # 2 pi / P of the ring sums, pi / C of the circle, 1 / 2 of the two grids.
         factor = np.pi**2 / size**2
         return here * factor, between * factor
+
+    @functools.cached_property
+    def refinement(self) -> RingRefinement:
+        """The same quadrature as a weighted sum over twice as many rings."""
+        return RingRefinement(self.n_phi, self._offset, self._circle_weights)
 
     @functools.cached_property
     def _half_step(self) -> HalfStep:

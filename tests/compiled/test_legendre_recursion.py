@@ -11,7 +11,7 @@ from spinsdw.compiled.legendre_recursion import (
     lower_order,
     raise_order,
 )
-from spinsdw.mirror_engine import _lowering_table
+from spinsdw.parity_engine import _lowering_table
 from tests.helpers import assert_close, small_d
 
 THETA = np.array([0.3, 1.1, 1.5, 2.5])
