@@ -112,7 +112,7 @@ class ParityEngine:
 
     @property
     def _reach(self) -> int:
-        return max(abs(n) for n in self.orders)
+        return max((abs(n) for n in self.orders), default=0)
 
     @functools.cached_property
     def _first_ring(self) -> int:
