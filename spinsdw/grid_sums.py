@@ -39,6 +39,8 @@ _MOST_MAPS = 4
 _COLUMN_BYTES = 2**26
 # Such batches that a thread has at a time, while circles are shifted.
 _SCRATCH_ARRAYS = 4
+# On rings without mirror images sums by parity are faster from here on.
+_LEAST_BANDLIMIT = 384
 
 
 @functools.lru_cache(maxsize=64)
@@ -52,7 +54,7 @@ def _ring_engine(sampling: Sampling) -> RingEngine:
 @functools.lru_cache(maxsize=128)
 def engine_of(sampling: Sampling, orders: tuple[int, ...]) -> RingEngine | ParityEngine:
     """Return the sums over degree on the rings of a sampling."""
-    is_interleaved = isinstance(sampling, MW)
+    is_interleaved = isinstance(sampling, MW) and sampling.bandlimit >= _LEAST_BANDLIMIT
     if sampling.is_symmetric or is_interleaved:
         half = (interleaved_rings if is_interleaved else mirrored_rings)(sampling.colatitudes)
         engine = ParityEngine(sampling.bandlimit, half, orders)
@@ -182,7 +184,7 @@ class GridSums:
         if not isinstance(self.sampling, MW):
             return None
         refined = RefinedSums(self.sampling, self.orders, self.mixing, self.real, self._threads)
-        return refined if refined.engine.is_worthwhile else None
+        return refined if refined.is_worthwhile else None
 
     def _share(self, call: Callable[[int, int], None], size: int, step: int) -> None:
         run_tasks(_ranges(call, size, step), self._threads)

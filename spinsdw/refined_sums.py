@@ -28,6 +28,8 @@ Array = np.ndarray[Any, Any]
 # Bytes of the refined columns that a task has at a time, but for those of the fewest orders m:
 # they stay in the cache that cores share.
 _ROOM_BYTES = 2**22
+# Refinement is faster from here on.
+_LEAST_BANDLIMIT = 192
 # Tasks of a transform that several threads may share.
 _SPANS = 8
 
@@ -63,9 +65,13 @@ class RefinedSums:
     threads: int
 
     @property
-    def engine(self) -> ParityEngine:
-        """The sums on the refined rings."""
+    def _engine(self) -> ParityEngine:
         return _engine_of(self.sampling, self.orders)
+
+    @property
+    def is_worthwhile(self) -> bool:
+        """Whether this is faster than a quadrature on the grid's own rings."""
+        return self.sampling.bandlimit >= _LEAST_BANDLIMIT and self._engine.is_worthwhile
 
     def _room_shape(self, maps: int, orders: int) -> tuple[int, int, int, int]:
         """Shape of the refined columns of some orders m and their opposites."""
@@ -117,7 +123,7 @@ class RefinedSums:
         identity = np.eye(len(self.orders), dtype=np.complex128)
 
         def fill(span: range, room: Array) -> None:
-            call = self.engine.filling(flm, sums, identity, room, self._rows(span))
+            call = self._engine.filling(flm, sums, identity, room, self._rows(span))
             call(span.start, span.stop)
             for fine, one in zip(room, columns, strict=True):
                 self.sampling.refinement.coarsen(fine, self.orders, span, one)
@@ -140,6 +146,6 @@ class RefinedSums:
         def add(span: range, room: Array) -> None:
             for one, fine in zip(columns, room, strict=True):
                 self.sampling.refinement.refine(one, self.orders, unmixing, span, fine)
-            self.engine.adding(room, sums, out, self._rows(span))(span.start, span.stop)
+            self._engine.adding(room, sums, out, self._rows(span))(span.start, span.stop)
 
         self._share(add, len(out))
