@@ -133,20 +133,19 @@ class GridSums:
         """Return how many complex numbers hold the Fourier columns of all outputs."""
         return min(batch, self._maps_together) * math.prod(self._columns_shape)
 
-    def scratch_bytes(self, batch: int = 1) -> int:
+    def scratch_bytes(self, batch: int = 1, *, quadrature: bool = False) -> int:
         """Return the bytes that a call takes beyond its input, output and workspace."""
         circle = 16 * self.sampling.n_phi * len(self.orders)
         batches = self._threads * max(_TASK_BYTES, circle)
         circles = (self._n_m + 1) // 2 * circle
-        refined = self._refined
-        more = refined.room_bytes(min(batch, self._maps_together)) if refined else 0
-        return _SCRATCH_ARRAYS * min(batches, circles) + more
+        refined = self._refined if quadrature else None
+        room = refined.room_bytes(min(batch, self._maps_together)) if refined else 0
+        return _SCRATCH_ARRAYS * min(batches, circles) + room
 
-    def working_bytes(self, batch: int = 1) -> int:
+    def working_bytes(self, batch: int = 1, *, quadrature: bool = False) -> int:
         """Return the bytes that a call takes beyond its input and output."""
-        return np.dtype(self.dtype).itemsize * self.workspace_size(batch) + self.scratch_bytes(
-            batch
-        )
+        workspace = np.dtype(self.dtype).itemsize * self.workspace_size(batch)
+        return workspace + self.scratch_bytes(batch, quadrature=quadrature)
 
     @property
     def maps_itemsize(self) -> int:
@@ -181,7 +180,7 @@ class GridSums:
     @property
     def _refined(self) -> RefinedSums | None:
         """The sums on refined rings, if they are the way of the quadrature."""
-        if not isinstance(self.sampling, MW):
+        if not isinstance(self.sampling, MW) or not self.orders:
             return None
         refined = RefinedSums(self.sampling, self.orders, self.mixing, self.real, self._threads)
         return refined if refined.is_worthwhile else None

@@ -67,11 +67,12 @@ class OrientationSums:
         sizes = (sums.workspace_size(min(batch, 1)) for sums, *_ in self._groups())
         return max(sizes, default=0)
 
-    def scratch_bytes(self, batch: int = 1) -> int:
+    def scratch_bytes(self, batch: int = 1, *, quadrature: bool = False) -> int:
         """Return the bytes that a call takes beyond its input, output and workspace."""
         size = np.dtype(self.dtype).itemsize
         groups = [
-            sums.scratch_bytes(min(batch, 1)) + size * math.prod(sums.maps_shape)
+            sums.scratch_bytes(min(batch, 1), quadrature=quadrature)
+            + size * math.prod(sums.maps_shape)
             for sums, *_ in self._groups()
         ]
         # The maps of the orders; `to_grid` puts complex ones in the output itself.

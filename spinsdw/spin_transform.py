@@ -160,13 +160,12 @@ class SpinHarmonicTransform:
         batch = check_integer(batch, "batch", minimum=0)
         flm = batch * 16 * self.bandlimit**2
         maps = batch * math.prod(self.shape) * self._sums.maps_itemsize
-        working = self._sums.working_bytes(batch)
-        there, back = MemoryEstimate(flm, maps, working), MemoryEstimate(maps, flm, working)
+        plain, exact = (self._sums.working_bytes(batch, quadrature=one) for one in (False, True))
         return {
-            "synthesis": there,
-            "analysis": back,
-            "adjoint_synthesis": back,
-            "adjoint_analysis": there,
+            "synthesis": MemoryEstimate(flm, maps, plain),
+            "analysis": MemoryEstimate(maps, flm, exact),
+            "adjoint_synthesis": MemoryEstimate(maps, flm, plain),
+            "adjoint_analysis": MemoryEstimate(flm, maps, exact),
         }
 
     def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:

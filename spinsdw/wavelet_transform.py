@@ -298,22 +298,35 @@ class SpinWaveletTransform(WaveletFrame):
         maps = self.harmonic.memory_estimate(batch)
         sums = [one.sums for one in self._scale_sums.values()]
         wavelets = batch * sum(math.prod(one.maps_shape) * one.maps_itemsize for one in sums)
-        scaling = self._scaling_transform.memory_estimate(batch)["synthesis"]
+        scaling = self._scaling_transform.memory_estimate(batch)
+        values = scaling["synthesis"].output + wavelets
         room = np.dtype(self.dtype).itemsize * max(one.workspace_size(batch) for one in sums)
-        working = room + max(one.scratch_bytes(batch) for one in sums)
-        # The scaling part has coefficients of its own: on the way there before any scale has.
-        part = scaling.input + scaling.working
-        there = MemoryEstimate(flm, scaling.output + wavelets, max(working, part - wavelets))
-        back = MemoryEstimate(there.output, flm, max(working, part))
+
+        def working(name: str, *, before: int) -> int:
+            """Of the scales, or of the scaling part while only so much of the output is there."""
+            exact = name in {"analysis", "adjoint_analysis"}
+            scratch = max(one.scratch_bytes(batch, quadrature=exact) for one in sums)
+            # The scaling part has coefficients of its own.
+            part = scaling["synthesis"].input + scaling[name].working
+            return max(room + scratch, part - before)
+
+        there = {
+            name: MemoryEstimate(flm, values, working(name, before=wavelets))
+            for name in ("synthesis", "adjoint_analysis")
+        }
+        back = {
+            name: MemoryEstimate(values, flm, working(name, before=0))
+            for name in ("analysis", "adjoint_synthesis")
+        }
         return {
-            "analysis_harmonic": there,
-            "synthesis_harmonic": back,
-            "adjoint_analysis_harmonic": back,
-            "adjoint_synthesis_harmonic": there,
-            "analysis": maps["analysis"].then(there),
-            "synthesis": back.then(maps["synthesis"]),
-            "adjoint_analysis": back.then(maps["adjoint_analysis"]),
-            "adjoint_synthesis": maps["adjoint_synthesis"].then(there),
+            "analysis_harmonic": there["synthesis"],
+            "synthesis_harmonic": back["analysis"],
+            "adjoint_analysis_harmonic": back["adjoint_synthesis"],
+            "adjoint_synthesis_harmonic": there["adjoint_analysis"],
+            "analysis": maps["analysis"].then(there["synthesis"]),
+            "synthesis": back["analysis"].then(maps["synthesis"]),
+            "adjoint_analysis": back["adjoint_synthesis"].then(maps["adjoint_analysis"]),
+            "adjoint_synthesis": maps["adjoint_synthesis"].then(there["adjoint_analysis"]),
         }
 
     def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:

@@ -172,13 +172,12 @@ class WignerTransform:
         sums = self._sums
         coefficients = batch * 16 * len(self.orders) * self.bandlimit**2
         functions = batch * math.prod(self.shape) * sums.maps_itemsize
-        there = MemoryEstimate(coefficients, functions, sums.working_bytes())
-        back = MemoryEstimate(functions, coefficients, sums.working_bytes())
+        plain, exact = (sums.working_bytes(quadrature=one) for one in (False, True))
         return {
-            "synthesis": there,
-            "analysis": back,
-            "adjoint_synthesis": back,
-            "adjoint_analysis": there,
+            "synthesis": MemoryEstimate(coefficients, functions, plain),
+            "analysis": MemoryEstimate(functions, coefficients, exact),
+            "adjoint_synthesis": MemoryEstimate(functions, coefficients, plain),
+            "adjoint_analysis": MemoryEstimate(coefficients, functions, exact),
         }
 
     def _check_memory(self, call: str, batch: tuple[int, ...]) -> None:
