@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner, kernel
 
 __all__ = ["fill_circles", "fold_circles", "join_circles", "mix_columns", "split_circles"]
 
@@ -28,7 +28,7 @@ def mix_columns(mixing, first_m, stop_m, columns):
                 columns[i, m, r] = value
 
 
-@kernel
+@inner
 def _mix_column(mixing, i, columns, m, mixed):
     """Fill mixed = sum_k mixing[i, k] columns[k, m]; zero for m = -1."""
     mixed[:] = 0.0

@@ -19,14 +19,14 @@ import math
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner, kernel
 
 __all__ = ["fill_folded", "fill_unfolded", "join_orders", "split_orders"]
 
 _STRIDE = 64
 
 
-@kernel
+@inner
 def _largest(values):
     found = 0
     for value in values:
@@ -34,7 +34,7 @@ def _largest(values):
     return found
 
 
-@kernel
+@inner
 def _fill_steps(phis, steps):
     """steps[r, t] = e^{i t phis[r]}; rings next but one, or neighbours, may share theirs."""
     for r in range(phis.size):
@@ -49,7 +49,7 @@ def _fill_steps(phis, steps):
                 steps[r, t] = complex(math.cos(t * phis[r]), math.sin(t * phis[r]))
 
 
-@kernel
+@inner
 def _prepare_phases(m, r, phis, steps, held, phases):
     """Return where phases[., t] = e^{i (m + t) phis[r]}, one product away from sine and cosine.
 
@@ -69,7 +69,7 @@ def _prepare_phases(m, r, phis, steps, held, phases):
     return place
 
 
-@kernel
+@inner
 def _add_modes(first, stop, i, ring, points, phases, place, columns, start, folded):
     """Add orders first <= m < stop and -m of one ring to its modes."""
     n_m = columns.shape[1]
@@ -82,7 +82,7 @@ def _add_modes(first, stop, i, ring, points, phases, place, columns, start, fold
         k = k + 1 if k + 1 < points else 0
 
 
-@kernel
+@inner
 def _add_real_modes(first, stop, i, ring, points, phases, place, columns, start, folded):
     """Add F e^{i k phi} and its conjugate to the half series of one ring."""
     if 2 * stop <= points:
@@ -128,7 +128,7 @@ def fill_folded(columns, rings, sizes, phis, limits, starts, is_real, folded):
                     _add_modes(first, stop, i, ring, points, phases, place, columns, start, folded)
 
 
-@kernel
+@inner
 def _take_modes(first, stop, i, ring, points, phases, place, start, folded, columns):
     n_m = columns.shape[1]
     k = first % points
@@ -140,7 +140,7 @@ def _take_modes(first, stop, i, ring, points, phases, place, start, folded, colu
         k = k + 1 if k + 1 < points else 0
 
 
-@kernel
+@inner
 def _take_real_modes(first, stop, i, ring, points, phases, place, start, folded, columns):
     k = first % points
     for m in range(first, stop):

@@ -23,7 +23,9 @@ import numba
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["cache_directory", "inner", "kernel"]
+from spinsdw.compiled.linking import PartCompiler, make_callable
+
+__all__ = ["cache_directory", "inner", "kernel", "room"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -188,21 +190,40 @@ class PackageCache(caching.FunctionCache):
 
 def kernel(function: Function) -> Function:
     """Compile on first call: no interpreter lock, numpy division, fused multiply-adds allowed."""
-    return _compile(function)
-
-
-def inner(function: Function) -> Function:
-    """Compile like `kernel` what kernels call for each block of rings: it must not allocate.
-
-    Numba counts references to arrays, for every slice as well, with atomic instructions: around the
-    short loops of a block they took as long as the loops. Here it does not.
-    """
-    return _compile(function, _nrt=False)
-
-
-def _compile(function: Function, **options: bool) -> Function:
-    jitted = numba.njit(nogil=True, error_model="numpy", fastmath=_FAST, **options)(function)
+    jitted = _compile(function)
     folder = None if config.DISABLE_JIT else cache_directory()
     if isinstance(jitted, Dispatcher) and folder is not None:
         jitted._cache = PackageCache(jitted.py_func, folder)
     return jitted
+
+
+def inner(function: Function) -> Function:
+    """Compile like `kernel` what only kernels call, to be part of them: it must not allocate.
+
+    Numba counts references to arrays, for every slice as well, with atomic instructions: around the
+    short loops of a block they took as long as the loops. Here it does not.
+    """
+    return _compile_part(function, _nrt=False)
+
+
+def room(function: Function) -> Function:
+    """Compile like `inner` what gives a kernel room: it may allocate."""
+    return _compile_part(function)
+
+
+def _compile_part(function: Function, **options: bool) -> Function:
+    """Compile what is in the cache only as a part of kernels."""
+    part = _compile(
+        function,
+        pipeline_class=PartCompiler,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        **options,
+    )
+    if isinstance(part, Dispatcher):
+        make_callable(part, _compile)
+    return part
+
+
+def _compile(function: Function, **options: Any) -> Function:
+    return numba.njit(nogil=True, error_model="numpy", fastmath=_FAST, **options)(function)

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from spinsdw.compiled.jit import inner, kernel
+from spinsdw.compiled.jit import inner, kernel, room
 from spinsdw.compiled.legendre_recursion import (
     fill_lowering,
     fill_parity_recursion,
@@ -262,7 +262,7 @@ def _load_block(quartet, start, g):
             g[k * RINGS + r] = quartet[k, start + r]
 
 
-@kernel
+@room
 def _workspace(L, reach, padded):
     """Return room for the recursion and the start of an order, and for series of degrees."""
     size = L + reach + PADDING
@@ -272,7 +272,7 @@ def _workspace(L, reach, padded):
     return recursion, start, (mixers, factors, np.empty((2, 2, size)), np.empty((2, size)))
 
 
-@kernel
+@room
 def _quartets(count, padded):
     """Return where the rows of each quartet begin, the rows of all, and room for a block."""
     places = np.empty((count, 2), dtype=np.int64)

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spinsdw.compiled.jit import inner, kernel
+from spinsdw.compiled.jit import inner, kernel, room
 from spinsdw.compiled.ring_sums import (
     CHUNK,
     add_block_to_degrees,
@@ -213,7 +213,7 @@ def _prepare_recursion(m, n, L, is_opposite, tables, recursion):
     _shift_argument(first, L, a, b, north, south)
 
 
-@kernel
+@room
 def _recursion_room(L):
     """Return a, b, the scale and both shifted arguments of `_prepare_recursion`, not filled."""
     return (
@@ -322,7 +322,7 @@ def _fill_orders(
             _mix_series(m, place, padded - RINGS, mixing, series[i], mixed, columns[i])
 
 
-@kernel
+@room
 def _block_room(pairs, size):
     """Return room for a block of rings: its start and sums, values, and rows of all series."""
     work = np.empty(5 * RINGS)

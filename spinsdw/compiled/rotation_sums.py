@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from spinsdw.compiled.jit import kernel
+from spinsdw.compiled.jit import inner, kernel
 from spinsdw.compiled.rotation_tile import (
     CHUNK,
     LANES,
@@ -43,7 +43,7 @@ _RENORM = 2.0**256
 _UNRENORM = 2.0**-256
 
 
-@kernel
+@inner
 def _fill_scales(m, L, root, sigma, rho):
     """Fill sigma_l(m) and rho_l(m), m <= l < L, zero below; root[k] = sqrt(k)."""
     sigma[:m] = 0.0
@@ -95,7 +95,7 @@ def fill_blocks(tile, L, is_real, flm, phases, tables, starts, blocks):
                     block[i, 4, r] = plus.imag - minus.imag
 
 
-@kernel
+@inner
 def _power(base, exponent):
     """Return (v, e), v 2**e = base**exponent, e a multiple of 256, for a base in [0, 1]."""
     value, power = 1.0, 0.0
@@ -116,7 +116,7 @@ def _power(base, exponent):
     return value, power
 
 
-@kernel
+@inner
 def _balance(value, power):
     """Bring the size of a mantissa below 1 and, where it is not zero, above 2**-256."""
     size = abs(value)
@@ -127,7 +127,7 @@ def _balance(value, power):
     return value, power
 
 
-@kernel
+@inner
 def _fill_starts(m, L, cosine, sine, tables, sigma, values, powers):
     """Fill the start of every recursion of row m: u = d^M_{m,+-k} / s_M at M = max(m, k).
 
@@ -166,7 +166,7 @@ def _fill_starts(m, L, cosine, sine, tables, sigma, values, powers):
             powers[at, k] = power if value != 0.0 else 0.0
 
 
-@kernel
+@inner
 def _start_tile(m, first, tile, row_sigma, values, powers, state, scales, row):
     """Set a tile to the degree ``first`` in whose chunk its lanes start; return those in range.
 
@@ -191,7 +191,7 @@ def _start_tile(m, first, tile, row_sigma, values, powers, state, scales, row):
     return inside
 
 
-@kernel
+@inner
 def _enter(state, at, scales, inside):
     """Move lanes that have grown into range; return how many are in range.
 
@@ -214,7 +214,7 @@ def _enter(state, at, scales, inside):
     return inside
 
 
-@kernel
+@inner
 def _step(first_m, tile, columns, blocks, block, factors, state, scales, inside, sums):
     """Advance a tile of every row by one chunk and add the lanes that are in range."""
     n_rows, n_tiles = inside.shape
@@ -236,7 +236,7 @@ def _step(first_m, tile, columns, blocks, block, factors, state, scales, inside,
             inside[row, tile] = _enter(state, at, scales, count)
 
 
-@kernel
+@inner
 def _fill_factors(m, first, L, shift, pole, tau, rho, factors):
     """Fill (2l+1) tau'_l rho_l(m) times cos(beta) -+ m^2 / (l (l+1)), and m / (l (l+1)).
 
@@ -257,7 +257,7 @@ def _fill_factors(m, first, L, shift, pole, tau, rho, factors):
             factors[i, 2] = scale * m
 
 
-@kernel
+@inner
 def _store_chunk(m, row, first, L, columns, sigma, phase, sums, out):
     """Put the sums of one row and chunk into out[l, +-m]."""
     sign = -1.0 if m & 1 else 1.0
