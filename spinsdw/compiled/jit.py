@@ -190,7 +190,7 @@ class PackageCache(caching.FunctionCache):
 
 def kernel(function: Function) -> Function:
     """Compile on first call: no interpreter lock, numpy division, fused multiply-adds allowed."""
-    jitted = _compile(function)
+    jitted = _compile(function, no_cfunc_wrapper=True)
     folder = None if config.DISABLE_JIT else cache_directory()
     if isinstance(jitted, Dispatcher) and folder is not None:
         jitted._cache = PackageCache(jitted.py_func, folder)

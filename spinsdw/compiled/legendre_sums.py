@@ -69,7 +69,7 @@ def _prepare_order(m, reach, L, tables, rings, is_new, window, recursion, mixers
     if window[1] > window[0]:
         # The last block of any later m, too, ends there.
         stop = window[1] + RINGS
-        prepare_start(m, 0, is_new, tables[1], rings, window[0], stop, powers, starts)
+        prepare_start(m, 0, is_new, tables[1], rings[:3], window[0], stop, powers, starts)
     return count
 
 

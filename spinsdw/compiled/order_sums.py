@@ -262,7 +262,7 @@ def _fill_orders(
             if first < L:
                 # The last block of any later m, too, ends there.
                 stop = high + RINGS
-                prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
+                prepare_start(m, n, is_new, tables[1], rings[:3], low, stop, powers, starts[j])
             total = _place_series(run, m, sides, series.shape, padded, places, rows)
             if total == 0 or first >= L:
                 continue
@@ -332,6 +332,16 @@ def _block_room(pairs, size):
     return (*start, *columns), work, np.empty(CHUNK * RINGS), places, np.zeros(size)
 
 
+@inner
+def _count_halves(runs):
+    """Return 2 where a series is on mirrored rings, otherwise 1."""
+    halves = 1
+    for j in range(runs.shape[0]):
+        if runs[j, 3] == 1 or runs[j, 6] == 1:
+            halves = 2
+    return halves
+
+
 @kernel
 def fill_columns(
     first_m,
@@ -358,7 +368,7 @@ def fill_columns(
     place[1] - m, of m >= 0 only for ``sides`` = 1, and the computed rings from place[2] on.
     """
     n_maps, n_orders, n_runs = flm.shape[0], weights.shape[0], runs.shape[0]
-    halves, padded = max(runs[:, 3].max(), runs[:, 6].max()) + 1, rings[0].size
+    halves, padded = _count_halves(runs), rings[0].size
     size = n_maps * n_orders * sides * halves * 2 * padded
     blocks = _block_room(n_maps, size + 2 * padded)
     room = (
@@ -472,7 +482,7 @@ def _add_orders(
             if not is_empty:
                 # The last block of any later m, too, ends there.
                 stop = high + RINGS
-                prepare_start(m, n, is_new, tables[1], rings, low, stop, powers, starts[j])
+                prepare_start(m, n, is_new, tables[1], rings[:3], low, stop, powers, starts[j])
             if is_empty:
                 continue
             total = _load_series(
