@@ -36,7 +36,7 @@ _FEWEST_RINGS = 16
 # Maps that go through the sums together, and bytes of their Fourier columns: with more maps values
 # made once save little more, and columns leave the cache.
 _MOST_MAPS = 4
-_COLUMN_BYTES = 2**26
+_COLUMN_BYTES = 2**25
 # Such batches that a thread has at a time, while circles are shifted.
 _SCRATCH_ARRAYS = 4
 # On rings without mirror images sums by parity are faster from here on.

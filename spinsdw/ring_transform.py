@@ -28,7 +28,7 @@ Array = np.ndarray[Any, Any]
 # Maps that go through the sums together, and bytes of their Fourier columns: with more maps values
 # made once save little more, and columns leave the cache.
 _MOST_MAPS = 4
-_COLUMN_BYTES = 2**26
+_COLUMN_BYTES = 2**25
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,8 @@ __all__ = ["warm_up"]
 Array = np.ndarray[Any, Any]
 
 BANDLIMIT = 8
+# From here on the McEwen-Wiaux grid has sums of its own.
+LARGE_BANDLIMIT = 384
 NSIDE = 4
 # A grid for each kind of quadrature, with and without mirrored rings.
 SAMPLING_NAMES = ("mw", "mwss", "gl")
@@ -63,6 +65,7 @@ def warm_up(threads: int | None = None) -> dict[str, float]:
     """
     paths: dict[str, Callable[[int | None], None]] = {
         "spin transforms": _spin_transforms,
+        "large spin transforms": _large_spin_transforms,
         "rotations": _rotations,
         "Wigner transforms": _wigner_transforms,
         "wavelet transforms": _wavelet_transforms,
@@ -88,6 +91,14 @@ def _spin_transforms(threads: int | None) -> None:
             for points in (np.ones(2), np.ones(2 * BANDLIMIT)):
                 values = transform.synthesis_at(np.zeros(BANDLIMIT**2), points, points)
                 transform.adjoint_synthesis_at(values, points, points)
+
+
+def _large_spin_transforms(threads: int | None) -> None:
+    for real, dtype in product((False, True), ("complex128", "complex64")):
+        transform = SpinHarmonicTransform(LARGE_BANDLIMIT, real=real, threads=threads, dtype=dtype)
+        maps = transform.synthesis(np.zeros(LARGE_BANDLIMIT**2, dtype=np.complex128))
+        transform.adjoint_analysis(transform.analysis(maps))
+        transform.adjoint_synthesis(maps)
 
 
 def _rotations(threads: int | None) -> None:

@@ -31,6 +31,15 @@ def around(transform, coefficients):
 
 for real in (True, False):
     rotate_flm(np.zeros((2, L * L)), (1, 2, 3), real=real)
+    for size, dtype in ((200, "complex64"), (400, "complex128"), (400, "complex64")):
+        around(
+            SpinHarmonicTransform(size, 0 if real else -2, real=real, dtype=dtype),
+            np.zeros((2, size * size), dtype=complex),
+        )
+for orders, real in (((-3, 0, 3), True), ((0, 1, 4), False)):
+    around(
+        WignerTransform(400, orders, real=real), np.zeros((len(orders), 400**2), dtype=complex)
+    )
 for sampling in SAMPLINGS:
     for spin, real in ((0, True), (0, False), (1, False), (-3, False)):
         around(
