@@ -92,7 +92,7 @@ for directions in (1, 4):
 
 def test_warming_up_tells_the_seconds_of_each_path():
     seconds = warm_up(threads=2)
-    assert len(seconds) == 7
+    assert len(seconds) == 8
     assert all(value > 0 for value in seconds.values())
 
 
