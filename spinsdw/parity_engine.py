@@ -52,12 +52,12 @@ class HalfRings:
     ----------
     colatitudes : ndarray, shape (rings,)
         Their distances from the pole that is nearer; increasing.
-    places : ndarray of int64, shape (rings,)
+    places : ndarray of uint64, shape (rings,)
         Where they are in the grid.
     signs : ndarray of float64, shape (rings,)
         Of the cosines of the colatitudes there.
-    mirrors : ndarray of int64, shape (rings,)
-        Where their mirror images are, -1 for none: the equator is none of its own.
+    mirrors : ndarray of uint64, shape (at most rings,)
+        Where the mirror images of the first of them are. The equator, last, is none of its own.
     """
 
     colatitudes: Array
@@ -68,25 +68,24 @@ class HalfRings:
     @property
     def are_mirrored(self) -> bool:
         """Whether any has a mirror image."""
-        return bool(np.any(self.mirrors >= 0))
+        return self.mirrors.size > 0
 
 
 def mirrored_rings(colatitudes: Array) -> HalfRings:
     """Return those of a grid symmetric about the equator."""
     count = (colatitudes.size + 1) // 2
-    places = np.arange(count)
-    mirrors = colatitudes.size - 1 - places
-    mirrors[mirrors == places] = -1
-    return HalfRings(colatitudes[:count], places, np.ones(count), mirrors)
+    places = np.arange(colatitudes.size, dtype=np.uint64)
+    mirrors = places[: count - 1 : -1].copy()
+    return HalfRings(colatitudes[:count], places[:count], np.ones(count), mirrors)
 
 
 def interleaved_rings(colatitudes: Array) -> HalfRings:
     """Return those of a grid of which the mirror image of no ring is a ring."""
     is_south = colatitudes > np.pi / 2
     distances = np.where(is_south, np.pi - colatitudes, colatitudes)
-    places = np.argsort(distances, kind="stable")
+    places = np.argsort(distances, kind="stable").astype(np.uint64)
     signs = np.where(is_south, -1.0, 1.0)
-    return HalfRings(distances[places], places, signs[places], np.full(places.size, -1))
+    return HalfRings(distances[places], places, signs[places], np.empty(0, dtype=np.uint64))
 
 
 @dataclass(frozen=True, eq=False)

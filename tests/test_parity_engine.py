@@ -63,7 +63,7 @@ def fill(engine, flm, sums, mixing=None):
 
 
 def engine_rings(engine):
-    return max(engine.half.places.max(), engine.half.mirrors.max()) + 1
+    return int(max(engine.half.places.max(), engine.half.mirrors.max(initial=0))) + 1
 
 
 def desired_columns(flm, orders, colatitudes):

@@ -10,7 +10,8 @@ side (m or -m) and map. Columns are complex arrays [map, k, row, ring], rows as 
 
 The rings come in order of their distance from the pole that is nearer. ``rings`` holds their sin,
 1 + cos, 1 - cos, cos^2, -sin^2 as of the northern hemisphere, the cosine with its sign, all of them
-and RINGS more; and where each is in a column, and its mirror image, -1 for none.
+and RINGS more; and where each is in a column, and where the mirror images of the first of them are.
+Those are unsigned: for a signed index numba asks every time whether it counts from the end.
 """
 
 from __future__ import annotations
@@ -179,14 +180,11 @@ def _mix_orders(k, low, stop, is_mirrored, mixing, hemispheres, mixed):
 
 
 @inner
-def _store_rings(low, stop, is_mirrored, places, mirrors, values, column):
-    """Put both hemispheres where they belong in a column."""
-    for r in range(low, stop):
-        column[places[r]] = complex(values[0, r], values[1, r])
-    if is_mirrored:
-        for r in range(low, stop):
-            if mirrors[r] >= 0:
-                column[mirrors[r]] = complex(values[2, r], values[3, r])
+def _store_rings(low, places, values, column):
+    """Put rings from ``low`` on where they belong in a column; values: real, imaginary parts."""
+    targets, real, imaginary = places[low:], values[0, low:], values[1, low:]
+    for r in range(targets.size):
+        column[targets[r]] = complex(real[r], imaginary[r])
 
 
 @inner
@@ -195,34 +193,30 @@ def _row_of(m, side, place):
 
 
 @inner
-def _clear_rings(m, side, stop, rings, place, columns):
-    """Set the columns of +m or -m of one map to zero on the first rings."""
-    places, mirrors, row = rings[6], rings[7], _row_of(m, side, place)
+def _clear_rings(row, stop, places, columns):
+    """Set a row of the columns of one map to zero on the first rings."""
+    targets = places[:stop]
     for k in range(columns.shape[0]):
-        for r in range(stop):
-            columns[k, row, places[r]] = 0.0
-            if mirrors[r] >= 0:
-                columns[k, row, mirrors[r]] = 0.0
+        for r in range(targets.size):
+            columns[k, row, targets[r]] = 0.0
 
 
 @inner
 def _store_orders(m, side, low, mixing, rings, divisors, orders, quartets, room, place, columns):
     """Fill the columns of +m or -m of one map, from ring ``low`` on, from its orders' sums."""
     hemispheres, mixed = room
-    stop, is_mirrored = rings[6].size, rings[7][0] >= 0
+    stop, is_mirrored = rings[6].size, rings[7].size > 0
     is_single = mixing.size == 1 and mixing[0, 0] == 1.0
     for i in range(orders.size):
         quartet, divisor = quartets[i], divisors[abs(orders[i])]
         _fill_hemispheres(low, stop, is_mirrored, quartet, rings[5], divisor, hemispheres[i])
     row = _row_of(m, side, place)
     for k in range(mixing.shape[0]):
-        if is_single:
-            _store_rings(
-                low, stop, is_mirrored, rings[6], rings[7], hemispheres[0], columns[k, row]
-            )
-        else:
+        values = hemispheres[0] if is_single else mixed
+        if not is_single:
             _mix_orders(k, low, stop, is_mirrored, mixing, hemispheres, mixed)
-            _store_rings(low, stop, is_mirrored, rings[6], rings[7], mixed, columns[k, row])
+        _store_rings(low, rings[6], values, columns[k, row])
+        _store_rings(low, rings[7], values[2:], columns[k, row])
 
 
 @inner
@@ -413,7 +407,9 @@ def _fill_orders(
                         target,
                     )
                 if clears:
-                    _clear_rings(m, side, min(low, rings[6].size), rings, place, target)
+                    row = _row_of(m, side, place)
+                    _clear_rings(row, low, rings[6], target)
+                    _clear_rings(row, low, rings[7], target)
 
 
 @kernel
@@ -477,19 +473,24 @@ def fill_parity_columns(
 @inner
 def _load_rings(low, stop, rings, divisor, column, quartet):
     """Split rings low <= r < stop of a column into even and odd parts, zero beyond the last."""
-    places, mirrors, cosine = rings[6], rings[7], rings[5]
-    last = min(stop, places.size)
-    for r in range(low, last):
-        here = column[places[r]]
-        even, odd = here, here
-        if mirrors[r] >= 0:
-            there = column[mirrors[r]]
-            even, odd = here + there, here - there
-        one, other = divisor[r], divisor[r] * cosine[r]
-        quartet[0, r] = one * even.real
-        quartet[1, r] = one * even.imag
-        quartet[2, r] = other * odd.real
-        quartet[3, r] = other * odd.imag
+    last = min(stop, rings[6].size)
+    places, mirrors = rings[6][low:last], rings[7][low:last]
+    even_real, even_imaginary = quartet[0, low:last], quartet[1, low:last]
+    odd_real, odd_imaginary = quartet[2, low:last], quartet[3, low:last]
+    one, x = divisor[low:last], rings[5][low:last]
+    for r in range(mirrors.size):
+        here, there = column[places[r]], column[mirrors[r]]
+        even, odd = one[r] * (here + there), (one[r] * x[r]) * (here - there)
+        even_real[r] = even.real
+        even_imaginary[r] = even.imag
+        odd_real[r] = odd.real
+        odd_imaginary[r] = odd.imag
+    for r in range(mirrors.size, places.size):
+        even = one[r] * column[places[r]]
+        even_real[r] = even.real
+        even_imaginary[r] = even.imag
+        odd_real[r] = x[r] * even.real
+        odd_imaginary[r] = x[r] * even.imag
     quartet[:, last:stop] = 0.0
 
 
