@@ -75,8 +75,8 @@ PLANS = {
         budget=4.0,
     ),
     "standard": Plan(
-        bandlimits=(128, 256, 512, 1024),
-        directions=(1, 3),
+        bandlimits=(128, 256, 512, 1024, 2048),
+        directions=(1, 3, 5),
         threads=(1, 2),
         nsides=(256, 512),
         s2let_bandlimits=(16, 32, 64, 128, 256),

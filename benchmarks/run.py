@@ -3,7 +3,7 @@
 Every job's rows are printed as they come and written to a JSON file after each job, with the
 machine, the versions and the date; ``python benchmarks/report.py`` makes the documentation's tables
 and figures from that of a standard or full run. ``--full`` takes about an hour on two cores and
-8 GB of memory, ``--standard`` some ten minutes, ``--quick`` a minute or two. Nothing else should
+8 GB of memory, ``--standard`` some twenty minutes, ``--quick`` a minute or two. Nothing else should
 run meanwhile. Jobs that are named are measured alone and join the others in the file.
 """
 
