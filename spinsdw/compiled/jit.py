@@ -23,7 +23,7 @@ import numba
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
-from spinsdw.compiled.linking import PartCompiler, make_callable
+from spinsdw.compiled.linking import PartCompiler, is_possible, make_callable
 
 __all__ = ["cache_directory", "inner", "kernel", "room"]
 
@@ -213,6 +213,8 @@ def room(function: Function) -> Function:
 
 def _compile_part(function: Function, **options: bool) -> Function:
     """Compile what is in the cache only as a part of kernels."""
+    if not is_possible():
+        return _compile(function, **options)
     part = _compile(
         function,
         pipeline_class=PartCompiler,

@@ -15,7 +15,18 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["PartCompiler", "make_callable"]
+__all__ = ["PartCompiler", "is_possible", "make_callable"]
+
+# What is left out or replaced, none of it promised by numba.
+_STAGES = ("_optimize_functions", "_optimize_final_module", "_finalize_final_module")
+_CALLS = ("_insert", "_compile_for_args")
+
+
+def is_possible() -> bool:
+    """Return whether this numba has the parts that are replaced here; where not, it does it all."""
+    return all(hasattr(JITCodeLibrary, name) for name in _STAGES) and all(
+        hasattr(Dispatcher, name) for name in _CALLS
+    )
 
 
 class _Part(JITCodeLibrary):

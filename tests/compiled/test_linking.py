@@ -95,3 +95,16 @@ def test_room_is_given_back():
     _nrt_python.memsys_disable_stats()
     assert after.mi_alloc - before.mi_alloc == 200
     assert after.mi_free - before.mi_free == 200
+
+
+@pytest.mark.usefixtures("cache")
+def test_another_numba_may_compile_parts_as_it_likes(monkeypatch):
+    monkeypatch.setattr(jit, "is_possible", lambda: False)
+
+    @jit.inner
+    def add(values):
+        return add_squares(values)
+
+    assert jit.kernel(lambda values: 2 * add(values))(VALUES) == 60.0
+    assert add(VALUES) == 30.0
+    assert add.overloads
