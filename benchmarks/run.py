@@ -21,6 +21,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+# Numpy asks for huge pages. Fresh ones cost a virtual machine whose host takes back what is free
+# up to twice the time of the transform that fills them, or nothing, by chance: small ones cost
+# ours and the peers' arrays the same every time. Numpy reads this when it is imported.
+os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")
+
 import geometry
 import resources
 import speed

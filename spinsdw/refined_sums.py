@@ -31,7 +31,7 @@ _ROOM_BYTES = 2**22
 # Refinement is faster from here on.
 _LEAST_BANDLIMIT = 192
 # Tasks of a transform that several threads may share.
-_SPANS = 16
+_SPANS = 8
 
 
 @functools.lru_cache(maxsize=128)
