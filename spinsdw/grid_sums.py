@@ -25,7 +25,7 @@ from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.equiangular import MW
 from spinsdw.signals import stored_dtype
 
-__all__ = ["GridSums", "engine_of", "fill_negative_orders"]
+__all__ = ["GridSums", "cleared_flm", "engine_of", "fill_negative_orders"]
 
 Array = np.ndarray[Any, Any]
 
@@ -61,6 +61,15 @@ def engine_of(sampling: Sampling, orders: tuple[int, ...]) -> RingEngine | Parit
         if engine.is_worthwhile:
             return engine
     return _ring_engine(sampling)
+
+
+def cleared_flm(shape: tuple[int, ...]) -> Array:
+    """Return complex128 zeros that sums are added to.
+
+    Written one by one: a page of `np.zeros` that is first read and then written, as by adding, is
+    made twice, and the second time every thread of the process waits.
+    """
+    return np.full(shape, 0.0, dtype=np.complex128)
 
 
 def fill_negative_orders(flm: Array) -> None:

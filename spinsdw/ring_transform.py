@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from spinsdw.errors import ParameterError
-from spinsdw.grid_sums import fill_negative_orders
+from spinsdw.grid_sums import cleared_flm, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.memory import MemoryEstimate, check_max_memory
 from spinsdw.parallel import resolve_threads, run_tasks, threads_for
@@ -254,7 +254,7 @@ class HealpixTransform:
         self._check_memory("adjoint_synthesis", np.shape(maps)[:-1])
         maps = check_map(maps, self.shape, real=self.real)
         rows = maps.reshape(-1, self.rings.n_pixels)
-        flm = np.zeros((rows.shape[0], self.bandlimit**2), dtype=np.complex128)
+        flm = cleared_flm((rows.shape[0], self.bandlimit**2))
         for part in self._parts(len(rows)):
             self._add_coefficients(rows[part], flm[part])
         if self.real:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from spinsdw.errors import ParameterError
-from spinsdw.grid_sums import GridSums, fill_negative_orders
+from spinsdw.grid_sums import GridSums, cleared_flm, fill_negative_orders
 from spinsdw.harmonics import (
     check_bandlimit,
     check_flm,
@@ -184,7 +184,7 @@ class SpinHarmonicTransform:
         self._check_memory("analysis" if quadrature else "adjoint_synthesis", np.shape(maps)[:-2])
         maps = check_map(maps, self.shape, real=self.real, may_be_single=True)
         batch = maps.reshape(-1, *self.shape)
-        flm = np.zeros((batch.shape[0], self.bandlimit**2), dtype=np.complex128)
+        flm = cleared_flm((batch.shape[0], self.bandlimit**2))
         self._sums.add_maps(batch[:, None], self._weights, flm[:, None], quadrature=quadrature)
         if self.real:
             fill_negative_orders(flm)

@@ -14,7 +14,7 @@ from spinsdw.coefficient_checks import check_coefficients, check_wanted
 from spinsdw.coefficients import WaveletCoefficients
 from spinsdw.directionality import Directionality, SteerableDirectionality
 from spinsdw.errors import ParameterError
-from spinsdw.grid_sums import fill_negative_orders
+from spinsdw.grid_sums import cleared_flm, fill_negative_orders
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer, resize
 from spinsdw.memory import MemoryEstimate
 from spinsdw.ring_transform import HealpixTransform
@@ -359,7 +359,7 @@ class SpinWaveletTransform(WaveletFrame):
         checked = self._checked(coefficients)
         scaling = checked["scaling"]
         wanted = set(self.shapes) if parts is None else check_wanted(parts, self.shapes)
-        flm = np.zeros((*scaling.shape[:-2], self.bandlimit**2), dtype=np.complex128)
+        flm = cleared_flm((*scaling.shape[:-2], self.bandlimit**2))
         rows = flm.reshape(-1, self.bandlimit**2)
         workspace = self._workspace(len(rows))
         for j, sums in self._scale_sums.items():

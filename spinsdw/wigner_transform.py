@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from spinsdw.errors import DataError, ParameterError, ShapeError
-from spinsdw.grid_sums import GridSums
+from spinsdw.grid_sums import GridSums, cleared_flm
 from spinsdw.harmonics import check_bandlimit, check_flm, check_integer
 from spinsdw.harmonics import orders as orders_of
 from spinsdw.memory import MemoryEstimate, check_max_memory
@@ -207,7 +207,7 @@ class WignerTransform:
         values = check_map(functions, self.shape, real=self.real, name="function")
         batch = values.reshape(-1, *self.shape)
         size = (batch.shape[0], len(self.orders), self.bandlimit**2)
-        found = np.zeros(size, dtype=np.complex128)
+        found = cleared_flm(size)
         for one, out in zip(batch, found, strict=True):
             self._sums.from_grid(one, weights, out=out, quadrature=quadrature)
             if self.real:
