@@ -12,8 +12,6 @@ from pathlib import Path
 
 __all__ = ["memory", "peak_bytes", "resident_bytes", "startup"]
 
-_LARGE = 400
-
 
 def _status(key: str) -> int | None:
     """Return a line of /proc/self/status in bytes, None where there is no such file."""
@@ -70,15 +68,17 @@ def memory(case: dict) -> dict[str, float]:
     import numpy as np
 
     from spinsdw import SpinWaveletTransform, WaveletCoefficients
+    from spinsdw.grid_sums import LARGE_BANDLIMIT
 
     rng = np.random.default_rng(0)
     options = {key: case[key] for key in ("dtype", "threads") if key in case}
     small = SpinWaveletTransform(8, 2, case["N"], **options)
     small.synthesis_harmonic(small.analysis_harmonic(np.zeros(64, dtype=complex)))
     # Large grids have compiled loops of their own: they must not be compiled while memory counts.
-    if case["L"] >= _LARGE:
-        other = SpinWaveletTransform(_LARGE, 2, **options)
-        other.synthesis_harmonic(other.analysis_harmonic(np.zeros(_LARGE**2, dtype=complex)))
+    if case["L"] >= LARGE_BANDLIMIT:
+        other = SpinWaveletTransform(LARGE_BANDLIMIT, 2, **options)
+        flm = np.zeros(LARGE_BANDLIMIT**2, dtype=complex)
+        other.synthesis_harmonic(other.analysis_harmonic(flm))
     transform = SpinWaveletTransform(case["L"], 2, case["N"], **options)
 
     def drawn(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:

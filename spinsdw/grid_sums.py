@@ -25,7 +25,13 @@ from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.equiangular import MW
 from spinsdw.signals import stored_dtype
 
-__all__ = ["GridSums", "cleared_flm", "engine_of", "fill_negative_orders"]
+__all__ = [
+    "LARGE_BANDLIMIT",
+    "GridSums",
+    "cleared_flm",
+    "engine_of",
+    "fill_negative_orders",
+]
 
 Array = np.ndarray[Any, Any]
 
@@ -40,7 +46,7 @@ _COLUMN_BYTES = 2**25
 # Such batches that a thread has at a time, while circles are shifted.
 _SCRATCH_ARRAYS = 4
 # On rings without mirror images sums by parity are faster from here on.
-_LEAST_BANDLIMIT = 384
+LARGE_BANDLIMIT = 384
 
 
 @functools.lru_cache(maxsize=64)
@@ -53,8 +59,8 @@ def _ring_engine(sampling: Sampling) -> RingEngine:
 
 @functools.lru_cache(maxsize=128)
 def engine_of(sampling: Sampling, orders: tuple[int, ...]) -> RingEngine | ParityEngine:
-    """Return the sums over degree on the rings of a sampling."""
-    is_interleaved = isinstance(sampling, MW) and sampling.bandlimit >= _LEAST_BANDLIMIT
+    """Return the faster sums over degree of these orders on the rings of a sampling."""
+    is_interleaved = isinstance(sampling, MW) and sampling.bandlimit >= LARGE_BANDLIMIT
     if sampling.is_symmetric or is_interleaved:
         half = (interleaved_rings if is_interleaved else mirrored_rings)(sampling.colatitudes)
         engine = ParityEngine(sampling.bandlimit, half, orders)
@@ -241,8 +247,8 @@ class GridSums:
         return [slice(first, first + step) for first in range(0, batch, step)]
 
     def _fill_together(self, flm: Array, sums: OrderSums, maps: Array, *, quadrature: bool) -> None:
-        columns, refined = self._columns(len(flm)), self._refined
-        if quadrature and refined:
+        columns, refined = self._columns(len(flm)), self._refined if quadrature else None
+        if refined:
             refined.fill_columns(flm, sums, columns)
         elif quadrature:
             identity = np.eye(len(self.orders), dtype=np.complex128)
@@ -292,8 +298,8 @@ class GridSums:
             len(maps),
             outputs,
         )
-        refined = self._refined
-        if quadrature and refined:
+        refined = self._refined if quadrature else None
+        if refined:
             refined.add_to_harmonics(columns, sums, out)
             return
         unmixing = np.ascontiguousarray(self.mixing.conj().T)

@@ -27,11 +27,12 @@ _MOST_ENLARGED = 256.0
 # for any n neither sin(theta) nor L sin(theta) is below these.
 _LEAST_SINE = 1 / 16
 _LEAST_PHASE = 8.0
-# Axes of the coefficients of one signal: sources, (l, m).
-_SINGLE = 2
+# Larger orders have a wide cap, and are summed by runs.
 _LARGEST_ORDER = 8
 # The part of the rings that may be next to a pole: with more the general sums are faster.
 _MOST_POLAR = 0.4
+# Axes of the coefficients of one signal: sources, (l, m).
+_SINGLE = 2
 
 
 def _lowering_table(n: int, size: int) -> Array:

@@ -26,8 +26,8 @@ __all__ = ["RefinedSums"]
 Array = np.ndarray[Any, Any]
 
 # Bytes of the refined columns that a task has at a time, but for those of the fewest orders m:
-# they stay in the cache that cores share.
-_ROOM_BYTES = 2**22
+# they stay in a core's second-level cache.
+_ROOM_BYTES = 2**20
 # Refinement is faster from here on.
 _LEAST_BANDLIMIT = 192
 # Tasks of a transform that several threads may share.

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from spinsdw.grid_sums import LARGE_BANDLIMIT
 from spinsdw.healpix import map_to_flm, pixel_directions
 from spinsdw.masks import cap_mask
 from spinsdw.polarisation import EBSeparator
@@ -28,8 +29,6 @@ __all__ = ["warm_up"]
 Array = np.ndarray[Any, Any]
 
 BANDLIMIT = 8
-# From here on the McEwen-Wiaux grid has sums of its own.
-LARGE_BANDLIMIT = 384
 NSIDE = 4
 # A grid for each kind of quadrature, with and without mirrored rings.
 SAMPLING_NAMES = ("mw", "mwss", "gl")

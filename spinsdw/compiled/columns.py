@@ -96,11 +96,11 @@ def fold_circles(circles, weights, shifted, even, odd, parities, offset, columns
 
 @kernel
 def split_circles(circles, weights, rows, parities, offset, shift, fine):
-    """Give every second ring of the fine rows its weighted value: circles t are rings 2 t + shift.
+    """Give every second ring of the fine rows its weighted value: the others are half a step on.
 
-    Row i of order n has the columns of even m, rows[0], and of odd m, rows[1] (-1: none), which a
-    circle holds together (`fill_circles`). ``shift`` is 1 for circles half a step on; then ring
-    2 t + offset + shift is point t, and point size - offset - shift - t is at minus its colatitude.
+    fine[i] has the columns of even m in rows[0] and of odd m in rows[1] (-1: none), which a circle
+    holds together (`fill_circles`). ``shift`` is 1 for circles half a step on. Ring 2 t + offset +
+    shift is point t, and point size - offset - shift - t is at minus its colatitude.
     """
     size = circles.shape[2]
     spare = np.empty(size + 1, dtype=np.complex128)

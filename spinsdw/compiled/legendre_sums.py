@@ -92,7 +92,7 @@ def _side_sign(m, side, n):
 
 @inner
 def _gather(m, side, L, flm, gathered):
-    """Gathered = f_{l, +-m}, m <= l < L, real parts and imaginary parts."""
+    """Fill gathered = f_{l, +-m}, m <= l < L, real parts and imaginary parts."""
     place = m * m + m + (m if side == 0 else -m)
     real, imaginary = gathered[0, m:L], gathered[1, m:L]
     for i in range(real.size):

@@ -23,14 +23,11 @@ import numpy as np
 from spinsdw.parallel import run_tasks
 from spinsdw.sampling.base import Sampling
 from spinsdw.sampling.half_step import HalfStep, modes
-from spinsdw.sampling.refinement import RingRefinement
+from spinsdw.sampling.refinement import BATCH_SIZE, RingRefinement, column_parities
 
 __all__ = ["MW", "MWSS"]
 
 Array = np.ndarray[Any, Any]
-
-# Complex numbers of one batch of circles: 4 such batches stay in a core's cache.
-_BATCH_SIZE = 2**14
 
 
 def _sine_weights(bandlimit: int, size: int, first: float) -> tuple[Array, Array]:
@@ -111,8 +108,8 @@ class _Equiangular(Sampling):
         self, columns: Array, orders: tuple[int, ...], *, mixing: Array, threads: int
     ) -> None:
         even, odd = _pairs(self.bandlimit, self.n_phi, columns.shape[1])
-        parities = np.where(np.array(orders) % 2 == 0, 1.0, -1.0)
-        step = max(1, _BATCH_SIZE // (self.n_phi * len(orders)))
+        parities = column_parities(orders)
+        step = max(1, BATCH_SIZE // (self.n_phi * len(orders)))
         tasks = [
             functools.partial(
                 self._weigh_batch,

@@ -21,12 +21,12 @@ import numpy as np
 
 from spinsdw.sampling.half_step import HalfStep
 
-__all__ = ["RingRefinement"]
+__all__ = ["BATCH_SIZE", "RingRefinement", "column_parities"]
 
 Array = np.ndarray[Any, Any]
 
 # Complex numbers of one batch of circles: 4 such batches stay in a core's cache.
-_BATCH_SIZE = 2**14
+BATCH_SIZE = 2**14
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ class RingRefinement:
             # Next to each other: (2 k, 2 k + 1), (-2 k, -2 k - 1).
             source = np.stack([source, opposite[0]], axis=-1).reshape(2, -1)
             target = np.stack([target, opposite[1]], axis=-1).reshape(2, -1)
-        step = 2 * max(1, _BATCH_SIZE // (2 * self.size * orders))
+        step = 2 * max(1, BATCH_SIZE // (2 * self.size * orders))
         for first in range(0, source.shape[1], step):
             part = slice(first, first + step)
             yield np.ascontiguousarray(source[:, part]), np.ascontiguousarray(target[:, part])
@@ -94,7 +94,7 @@ class RingRefinement:
         """
         from spinsdw.compiled.columns import fill_circles, split_circles
 
-        parities, offset = _parities(orders), self.offset
+        parities, offset = column_parities(orders), self.offset
         for source, target in self._batches(span, columns.shape[1], parities.size):
             shape = (parities.size, source.shape[1], self.size)
             circles = np.empty(shape, dtype=np.complex128)
@@ -107,7 +107,7 @@ class RingRefinement:
         """Apply the adjoint of `refine` without mixing: fill rows i < orders of the columns."""
         from spinsdw.compiled.columns import fold_circles, join_circles
 
-        parities, offset = _parities(orders), self.offset
+        parities, offset = column_parities(orders), self.offset
         for target, source in self._batches(span, columns.shape[1], parities.size):
             shape = (parities.size, source.shape[1], self.size)
             circles, shifted = (np.empty(shape, dtype=np.complex128) for _ in range(2))
@@ -118,6 +118,6 @@ class RingRefinement:
             fold_circles(circles, self._ones, shifted, even, odd, parities, offset, columns)
 
 
-def _parities(orders: tuple[int, ...]) -> Array:
+def column_parities(orders: tuple[int, ...]) -> Array:
     """Return the parity in theta of the columns of even m, for each order n."""
     return np.where(np.array(orders) % 2 == 0, 1.0, -1.0)
